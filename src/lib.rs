@@ -1,0 +1,3 @@
+//! onemesh: one mesh for every face.
+
+pub mod mesh;
