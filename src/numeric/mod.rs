@@ -1,0 +1,17 @@
+//! Numbers without geometry: sparse solves, rotations between point sets, the optimiser. Layer 1.
+
+mod adam_uniform;
+mod cholesky;
+mod dissection;
+#[cfg(test)]
+pub mod finite_difference;
+mod kabsch;
+mod random;
+mod supernodal;
+
+pub use adam_uniform::AdamUniform;
+pub use cholesky::{NotPositiveDefinite, SparseCholesky, SymmetricMatrix};
+pub use dissection::Dissection;
+pub use kabsch::{Similarity, weighted_rotation};
+pub use random::Random;
+pub use supernodal::SolveBuffer;
