@@ -1,0 +1,41 @@
+use glam::Vec3A;
+
+use super::{Gradient, Shape};
+
+/// A landmark: a point of the template, and where it belongs on the scan.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LandmarkPull {
+    /// The template's triangle.
+    pub triangle: u32,
+    /// Barycentric weights c on it.
+    pub weights: [f32; 3],
+    /// k: the landmark on the scan, in unit space.
+    pub target: Vec3A,
+    /// Weight of this landmark.
+    pub weight: f32,
+}
+
+/// The landmark term: 1/B sum_i w_i |c_i - k_i|^2.
+pub struct Landmarks<'a> {
+    /// The landmarks known on both sides `[B]`.
+    pub pulls: &'a [LandmarkPull],
+}
+
+impl Landmarks<'_> {
+    /// Adds `weight` times the gradient and returns the unweighted value.
+    pub fn add(&self, shape: Shape, weight: f32, gradient: &mut Gradient) -> f64 {
+        let count = self.pulls.len().max(1) as f32;
+        let mut sum = 0.0;
+        for pull in self.pulls {
+            let corners = shape.topology.triangles[pull.triangle as usize];
+            let on_template: Vec3A =
+                corners.iter().zip(pull.weights).map(|(&i, w)| shape.positions[i as usize] * w).sum();
+            let difference = on_template - pull.target;
+            sum += f64::from(pull.weight * difference.length_squared());
+            for (&i, w) in corners.iter().zip(pull.weights) {
+                gradient.positions[i as usize] += difference * (2.0 * weight * pull.weight * w / count);
+            }
+        }
+        sum / f64::from(count)
+    }
+}
