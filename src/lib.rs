@@ -3,3 +3,6 @@
 pub mod energy;
 pub mod mesh;
 pub mod numeric;
+pub mod pipeline;
+pub mod reparam;
+pub mod spatial;

@@ -1,0 +1,134 @@
+use glam::{DVec3, Vec3A};
+use rayon::prelude::*;
+
+use crate::mesh::{Topology, TriangleMesh};
+use crate::numeric::Random;
+use crate::spatial::{Hit, SurfaceIndex};
+
+/// A point of the scan and its unit normal.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SurfaceSample {
+    /// Position in unit space.
+    pub point: Vec3A,
+    /// Unit normal of the scan there.
+    pub normal: Vec3A,
+}
+
+/// A scan made ready to be fitted: in unit space (its vertices' mean at the origin, the farthest at distance one), with
+/// an index of its triangles, its rim and samples of its surface.
+pub struct ScanSurface {
+    /// The vertices' mean, in the scan's own space.
+    pub centre: DVec3,
+    /// The largest distance of a vertex from it, in the scan's units.
+    pub radius: f64,
+    /// Nearest points, in unit space.
+    pub index: SurfaceIndex,
+    /// Evenly spread samples in random order, so that any stretch of them covers the surface.
+    pub samples: Vec<SurfaceSample>,
+    /// Unit normals per vertex, interpolated by [`ScanSurface::normal_at`].
+    normals: Vec<Vec3A>,
+    /// Which sides of each triangle (opposite its first, second, third corner) are on a rim.
+    rim_sides: Vec<[bool; 3]>,
+    rim_vertices: Vec<bool>,
+}
+
+impl ScanSurface {
+    /// Prepares a scan, with this many samples.
+    pub fn new(mesh: &TriangleMesh, samples: usize) -> Self {
+        let centre = mesh.centroid();
+        let radius = mesh.radius_about(centre);
+        let positions: Vec<Vec3A> =
+            mesh.positions().iter().map(|p| ((*p - centre) / radius).as_vec3a()).collect();
+        let topology = Topology::of(mesh);
+        let normals = crate::mesh::Normals::new(&topology, &positions);
+        let samples = sample(mesh.triangles(), &positions, &normals, samples);
+        Self {
+            centre,
+            radius,
+            index: SurfaceIndex::new(&positions, mesh.triangles()),
+            samples,
+            normals: normals.vertices,
+            rim_sides: rim_sides(&topology),
+            rim_vertices: topology.on_rim,
+        }
+    }
+
+    /// From the scan's space to unit space.
+    pub fn to_unit(&self, point: DVec3) -> Vec3A {
+        ((point - self.centre) / self.radius).as_vec3a()
+    }
+
+    /// From unit space to the scan's.
+    pub fn to_scan(&self, point: Vec3A) -> DVec3 {
+        point.as_dvec3() * self.radius + self.centre
+    }
+
+    /// The scan's smooth unit normal at a point of it.
+    pub fn normal_at(&self, hit: &Hit) -> Vec3A {
+        let corners = self.index.triangles()[hit.triangle as usize];
+        corners.iter().zip(hit.weights).map(|(&i, w)| self.normals[i as usize] * w).sum::<Vec3A>().normalize_or_zero()
+    }
+
+    /// Whether a point of the scan lies on its rim: there the data ends.
+    pub fn on_rim(&self, hit: &Hit) -> bool {
+        let t = hit.triangle as usize;
+        let on_side = (0..3).any(|k| hit.weights[k] <= 1e-6 && self.rim_sides[t][k]);
+        let on_vertex =
+            (0..3).any(|k| hit.weights[k] >= 1.0 - 1e-6 && self.rim_vertices[self.index.triangles()[t][k] as usize]);
+        on_side || on_vertex
+    }
+}
+
+fn rim_sides(topology: &Topology) -> Vec<[bool; 3]> {
+    let mut sides = vec![[false; 3]; topology.triangles.len()];
+    for (&[a, b], &[left, right]) in topology.edges.iter().zip(&topology.edge_triangles) {
+        if left == right {
+            for k in 0..3 {
+                let corner = topology.triangles[left as usize][k];
+                if corner != a && corner != b {
+                    sides[left as usize][k] = true;
+                }
+            }
+        }
+    }
+    sides
+}
+
+/// Samples spread evenly by area: one in each of `count` equal stretches of the triangles laid end to end.
+fn sample(
+    triangles: &[[u32; 3]],
+    positions: &[Vec3A],
+    normals: &crate::mesh::Normals,
+    count: usize,
+) -> Vec<SurfaceSample> {
+    let mut random = Random::new(1);
+    let areas = normals.area_vectors.iter().map(|e| f64::from(e.length()));
+    let total: f64 = areas.clone().sum();
+    let mut samples = Vec::with_capacity(count);
+    let (mut passed, mut next) = (0.0, random.unit());
+    for (t, area) in areas.enumerate() {
+        passed += area / total * count as f64;
+        while next < passed && samples.len() < count {
+            let (root, along) = (random.unit().sqrt(), random.unit());
+            let weights = [1.0 - root, root * (1.0 - along), root * along].map(|w| w as f32);
+            let corners = triangles[t];
+            let at = |values: &[Vec3A]| -> Vec3A {
+                corners.iter().zip(weights).map(|(&i, w)| values[i as usize] * w).sum()
+            };
+            samples.push(SurfaceSample {
+                point: at(positions),
+                normal: at(&normals.vertices).normalize_or_zero(),
+            });
+            next = samples.len() as f64 + random.unit();
+        }
+    }
+    for i in (1..samples.len()).rev() {
+        samples.swap(i, random.below(i + 1));
+    }
+    samples
+}
+
+/// Applies `f` to every item in parallel, in place, in chunks large enough to be worth a thread.
+pub(super) fn refresh<T: Send, F: Fn(usize, &mut T) + Sync>(items: &mut [T], f: F) {
+    items.par_iter_mut().enumerate().with_min_len(256).for_each(|(i, item)| f(i, item));
+}

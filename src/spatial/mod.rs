@@ -1,0 +1,15 @@
+//! Nearest points on a surface: an exact index over its triangles, and a walk from the last answer. Layer 2.
+
+mod boxes;
+mod lanes;
+mod packet;
+mod surface_index;
+mod surface_walk;
+#[cfg(test)]
+mod tests;
+mod tree;
+mod triangle;
+
+pub use surface_index::{Hit, SurfaceIndex};
+pub use surface_walk::SurfaceWalk;
+pub use triangle::{Feature, TrianglePoint, closest_on_triangle};
