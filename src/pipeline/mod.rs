@@ -2,6 +2,7 @@
 
 mod scan_surface;
 pub mod fit;
+pub mod groupwise;
 pub mod resample;
 
 pub use scan_surface::{ScanSurface, SurfaceSample};

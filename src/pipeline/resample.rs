@@ -25,9 +25,9 @@ pub fn landmarks_on_sphere(
 }
 
 /// The mean of the members' sphere landmarks after rotating each by weighted Kabsch onto the first, back on the sphere.
-pub fn average(members: &[Vec<Option<DVec3>>], weights: &[f64]) -> Vec<Option<DVec3>> {
+pub fn average(members: &[Vec<Option<DVec3>>], weights: &[f64], power: f64) -> Vec<Option<DVec3>> {
     let Some(first) = members.first() else { return Vec::new() };
-    let mut sums = vec![DVec3::ZERO; weights.len()];
+    let mut aligned = Vec::new();
     for member in members {
         let (mut a, mut b, mut w) = (Vec::new(), Vec::new(), Vec::new());
         for ((own, reference), &weight) in member.iter().zip(first).zip(weights) {
@@ -38,13 +38,33 @@ pub fn average(members: &[Vec<Option<DVec3>>], weights: &[f64]) -> Vec<Option<DV
             }
         }
         let rotation = weighted_rotation(&a, &b, &w);
-        for (sum, own) in sums.iter_mut().zip(member) {
-            if let Some(own) = own {
-                *sum += rotation * *own;
-            }
-        }
+        aligned.push(member.iter().map(|p| p.map(|p| rotation * p)).collect::<Vec<_>>());
     }
-    sums.into_iter().map(|sum| (sum != DVec3::ZERO).then(|| sum.normalize())).collect()
+    let mean = weighted(&aligned, |_, _| 1.0);
+    let near: Vec<Vec<usize>> = (0..weights.len()).map(|b| nearest(&mean, b, 6)).collect();
+    weighted(&aligned, |m, b| room(&aligned[m], b, &near[b]).powf(power))
+}
+
+fn nearest(points: &[Option<DVec3>], b: usize, count: usize) -> Vec<usize> {
+    let Some(p) = points[b] else { return Vec::new() };
+    let mut others: Vec<(f64, usize)> = points.iter().enumerate().filter(|(k, _)| *k != b).filter_map(|(k, q)| q.map(|q| (q.distance(p), k))).collect();
+    others.sort_by(|a, b| a.0.total_cmp(&b.0));
+    others.into_iter().take(count).map(|(_, k)| k).collect()
+}
+
+fn room(member: &[Option<DVec3>], b: usize, near: &[usize]) -> f64 {
+    let Some(p) = member[b] else { return 0.0 };
+    let d: Vec<f64> = near.iter().filter_map(|&k| member[k].map(|q| q.distance(p))).collect();
+    d.iter().sum::<f64>() / d.len().max(1) as f64
+}
+
+fn weighted(members: &[Vec<Option<DVec3>>], weight: impl Fn(usize, usize) -> f64) -> Vec<Option<DVec3>> {
+    (0..members[0].len())
+        .map(|b| {
+            let sum: DVec3 = members.iter().enumerate().filter_map(|(m, member)| member[b].map(|p| p * weight(m, b))).sum();
+            (sum != DVec3::ZERO).then(|| sum.normalize())
+        })
+        .collect()
 }
 
 /// The sphere's surface points nearest to positions on it.
