@@ -1,3 +1,4 @@
 //! onemesh: one mesh for every face.
 
+pub mod formats;
 pub mod mesh;
