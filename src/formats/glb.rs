@@ -255,3 +255,104 @@ fn container(mut json: Vec<u8>, binary: Vec<u8>) -> Result<Vec<u8>, Fault> {
     }
     Ok(out)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::{MeshFormat, parse_mesh};
+    use super::*;
+
+    fn tetrahedron(centre: DVec3) -> TriangleMesh {
+        let corners = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z].map(|p| p * 0.25 + centre);
+        TriangleMesh::new(corners.to_vec(), vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]).unwrap()
+    }
+
+    fn read_back(glb: &Glb) -> TriangleMesh {
+        parse_mesh(&glb_bytes(glb).unwrap(), MeshFormat::Gltf).unwrap()
+    }
+
+    fn json_of(glb: &Glb) -> Value {
+        let bytes = glb_bytes(glb).unwrap();
+        let length = u32::from_le_bytes(*bytes[12..].first_chunk().unwrap()) as usize;
+        serde_json::from_slice(&bytes[20..20 + length]).unwrap()
+    }
+
+    #[test]
+    fn what_is_written_is_read_back() {
+        let mesh = tetrahedron(DVec3::new(0.5, 0.0, -1.0));
+        assert_eq!(read_back(&Glb::new(&mesh)), mesh);
+        assert_eq!(json_of(&Glb::new(&mesh))["nodes"][0].get("translation"), None);
+    }
+
+    #[test]
+    fn vertices_in_one_place_and_unnamed_ones_stay() {
+        let mut positions = tetrahedron(DVec3::ZERO).positions().to_vec();
+        positions.extend([DVec3::X * 0.25, DVec3::ONE]);
+        let mesh = TriangleMesh::new(positions, vec![[0, 2, 1], [0, 4, 3]]).unwrap();
+        assert_eq!(read_back(&Glb::new(&mesh)), mesh);
+    }
+
+    #[test]
+    fn a_mesh_far_away_loses_nothing() {
+        for far in [DVec3::new(1e6, 0.0, 0.0), DVec3::new(-4_531_234.56, 123.4, 7e7), DVec3::splat(1e12)] {
+            let mesh = tetrahedron(far);
+            let read = read_back(&Glb::new(&mesh));
+            let pairs = mesh.positions().iter().zip(read.positions());
+            let furthest = pairs.map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
+            // Above 1e9 doubles themselves are coarser.
+            assert!(furthest <= 1e-6 * 0.25 + far.length() * 1e-15, "{far}: {furthest}");
+        }
+    }
+
+    #[test]
+    fn the_stored_centre_is_a_32_bit_number() {
+        let translation =
+            &json_of(&Glb::new(&tetrahedron(DVec3::splat(123_456.789))))["nodes"][0]["translation"];
+        for coordinate in translation.as_array().unwrap() {
+            let coordinate = coordinate.as_f64().unwrap();
+            assert_eq!(f64::from(coordinate as f32), coordinate);
+            assert!((coordinate - 123_456.789).abs() < 0.25);
+        }
+    }
+
+    #[test]
+    fn attributes_and_extras_are_described() {
+        let mesh = tetrahedron(DVec3::ZERO);
+        let (normals, uvs) =
+            ([DVec3::X * 1e-300, DVec3::ZERO, DVec3::Y * 1e300, DVec3::NEG_Z], [DVec2::ONE; 4]);
+        let residual = [0.5, 0.1, 0.0, 2.0];
+        let glb = Glb {
+            normals: Some(&normals),
+            texture_coordinates: Some(&uvs),
+            scalars: vec![("_RESIDUAL", &residual)],
+            extras: json!({ "landmarks": { "tip": [0.0, 0.0, 0.25] } }),
+            ..Glb::new(&mesh)
+        };
+        let document = json_of(&glb);
+        let attributes = &document["meshes"][0]["primitives"][0]["attributes"];
+        assert_eq!(*attributes, json!({ "POSITION": 0, "NORMAL": 1, "TEXCOORD_0": 2, "_RESIDUAL": 3 }));
+        assert_eq!(document["accessors"][0]["max"], json!([0.25, 0.25, 0.25]));
+        assert_eq!(document["accessors"][1]["max"], json!([1.0, 1.0, 1.0]));
+        assert_eq!(document["accessors"][3]["min"], json!([0.0]));
+        assert_eq!(document["scenes"][0]["extras"]["landmarks"]["tip"], json!([0.0, 0.0, 0.25]));
+        assert_eq!(glb_bytes(&glb).unwrap(), glb_bytes(&glb.clone()).unwrap());
+    }
+
+    #[test]
+    fn what_does_not_fit_is_refused() {
+        let mesh = tetrahedron(DVec3::ZERO);
+        let complaint = |name, values: &[f64]| {
+            let glb = Glb { scalars: vec![(name, values)], ..Glb::new(&mesh) };
+            glb_bytes(&glb).unwrap_err().to_string()
+        };
+        assert!(complaint("_A", &[1.0; 3]).contains("3 values for 4 vertices"));
+        assert!(complaint("_A", &[1.0, f64::NAN, 0.0, 0.0]).contains("`_A` has a value"));
+        assert!(complaint("_A", &[1.0, 1e39, 0.0, 0.0]).contains("`_A` has a value"));
+        for name in ["A", "_", "_a", "POSITION", ""] {
+            assert!(complaint(name, &[1.0; 4]).contains("must be named"), "{name}");
+        }
+        let twice = Glb { scalars: vec![("_A", &[1.0; 4]), ("_A", &[1.0; 4])], ..Glb::new(&mesh) };
+        assert!(glb_bytes(&twice).unwrap_err().to_string().contains("given twice"));
+        let vast = TriangleMesh::new(vec![DVec3::ZERO, DVec3::X * 1e300, DVec3::Y], vec![[0, 1, 2]]).unwrap();
+        assert!(glb_bytes(&Glb::new(&vast)).unwrap_err().to_string().contains("`POSITION`"));
+    }
+}
