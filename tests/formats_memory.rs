@@ -46,7 +46,7 @@ fn bytes_per_byte(file: &[u8], read: impl FnOnce(&[u8])) -> f64 {
 }
 
 const LARGE: usize = 1 << 20;
-const LIMIT: f64 = 64.0;
+const LIMIT: f64 = 32.0;
 
 #[track_caller]
 fn check_mesh(format: MeshFormat, file: &[u8]) {

@@ -43,7 +43,7 @@ pub enum Fault {
     Mesh(#[from] MeshError),
     /// What is to be written does not fit the format.
     #[error("{0}")]
-    NotWritable(String),
+    DoesNotFit(String),
 }
 
 impl Fault {

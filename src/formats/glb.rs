@@ -60,7 +60,7 @@ pub fn write_glb(path: impl AsRef<Path>, glb: &Glb) -> Result<(), FormatError> {
 /// mesh's size.
 ///
 /// # Errors
-/// [`Fault::NotWritable`] for an attribute that has not one finite value for each vertex or a name that glTF does not
+/// [`Fault::DoesNotFit`] for an attribute that has not one finite value for each vertex or a name that glTF does not
 /// allow, and for more than 4 GiB.
 pub fn glb_bytes(glb: &Glb) -> Result<Vec<u8>, FormatError> {
     let centre = stored_centre(glb.mesh.positions());
@@ -100,7 +100,7 @@ fn write_attributes(glb: &Glb, centre: DVec3, parts: &mut Parts) -> Result<Map<S
     let mut add = |name: &str, values: Values| -> Result<(), Fault> {
         values.check(name, vertices)?;
         match attributes.insert(name.to_owned(), parts.add(values).into()) {
-            Some(_) => Err(Fault::NotWritable(format!("the attribute `{name}` is given twice"))),
+            Some(_) => Err(Fault::DoesNotFit(format!("the attribute `{name}` is given twice"))),
             None => Ok(()),
         }
     };
@@ -133,7 +133,7 @@ fn check_name(name: &str) -> Result<(), Fault> {
         return Ok(());
     }
     let problem = format!("the attribute `{name}` must be named `_` and then capitals, digits or `_`");
-    Err(Fault::NotWritable(problem))
+    Err(Fault::DoesNotFit(problem))
 }
 
 /// The point that positions are stored about: the origin, or, where the mesh is many times its size away from it, the
@@ -199,11 +199,11 @@ impl Values {
     fn check(&self, name: &str, vertices: usize) -> Result<(), Fault> {
         if self.count != vertices {
             let problem = format!("the attribute `{name}` has {} values for {vertices} vertices", self.count);
-            return Err(Fault::NotWritable(problem));
+            return Err(Fault::DoesNotFit(problem));
         }
         if !self.low.iter().chain(&self.high).all(|bound| bound.is_finite()) {
             let problem = format!("the attribute `{name}` has a value that is no finite 32-bit number");
-            return Err(Fault::NotWritable(problem));
+            return Err(Fault::DoesNotFit(problem));
         }
         Ok(())
     }
@@ -242,7 +242,7 @@ impl Parts {
 fn container(mut json: Vec<u8>, binary: Vec<u8>) -> Result<Vec<u8>, Fault> {
     json.resize(json.len().next_multiple_of(4), b' ');
     let length = 12 + 8 + json.len() + 8 + binary.len();
-    let too_large = || Fault::NotWritable(format!("the file would have {length} bytes; GLB reaches to 2^32"));
+    let too_large = || Fault::DoesNotFit(format!("the file would have {length} bytes; GLB reaches to 2^32"));
     let length = u32::try_from(length).map_err(|_| too_large())?;
     let mut out = Vec::with_capacity(length as usize);
     out.extend(b"glTF");

@@ -9,17 +9,19 @@ use crate::formats::MeshFormat;
 pub(super) fn sources(folder: &Path) -> Result<Vec<Source>, CollectionError> {
     let mut sources = Vec::new();
     for path in entries(folder)? {
-        let name = if path.is_dir() { file_name(&path)? } else { stem(&path)? };
-        let (mesh, landmarks) = if path.is_dir() {
-            let Some(mesh) = scan_in(&path)? else { continue };
-            (mesh, path.join("landmarks.json"))
+        if path.is_dir() {
+            if let Some(mesh) = scan_in(&path)? {
+                sources.push(Source {
+                    name: file_name(&path)?,
+                    mesh,
+                    landmarks: path.join("landmarks.json"),
+                });
+            }
         } else if is_mesh(&path) {
+            let name = stem(&path)?;
             let landmarks = folder.join(format!("{name}.landmarks.json"));
-            (path, landmarks)
-        } else {
-            continue;
-        };
-        sources.push(Source { name, mesh, landmarks });
+            sources.push(Source { name, mesh: path, landmarks });
+        }
     }
     Ok(sources)
 }

@@ -26,16 +26,21 @@ impl<'a> Container<'a> {
             ))
         })?;
         let mut chunks = Chunks { rest: content };
-        let Some((b"JSON", json)) = chunks.next()? else {
+        let Some(Chunk { kind: b"JSON", data: json }) = chunks.next()? else {
             return Err(fault("does not begin with a JSON chunk".to_owned()));
         };
         let mut binary = None;
-        while let (None, Some((kind, data))) = (binary, chunks.next()?) {
+        while let (None, Some(chunk)) = (binary, chunks.next()?) {
             // Chunks of other kinds are for extensions.
-            binary = (kind == b"BIN\0").then_some(data);
+            binary = (chunk.kind == b"BIN\0").then_some(chunk.data);
         }
         Ok(Self { json, binary })
     }
+}
+
+struct Chunk<'a> {
+    kind: &'a [u8; 4],
+    data: &'a [u8],
 }
 
 struct Chunks<'a> {
@@ -43,8 +48,7 @@ struct Chunks<'a> {
 }
 
 impl<'a> Chunks<'a> {
-    /// The next chunk's kind and data.
-    fn next(&mut self) -> Result<Option<(&'a [u8; 4], &'a [u8])>, Fault> {
+    fn next(&mut self) -> Result<Option<Chunk<'a>>, Fault> {
         if self.rest.is_empty() {
             return Ok(None);
         }
@@ -57,7 +61,7 @@ impl<'a> Chunks<'a> {
             ))
         })?;
         self.rest = &self.rest[CHUNK_HEADER + length..];
-        Ok(Some((kind, data)))
+        Ok(Some(Chunk { kind, data }))
     }
 }
 
