@@ -1,6 +1,9 @@
 //! onemesh: one mesh for every face.
 
+pub mod demo;
 pub mod energy;
+pub mod evaluate;
+pub mod formats;
 pub mod mesh;
 pub mod numeric;
 pub mod picture;

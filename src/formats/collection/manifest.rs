@@ -1,0 +1,33 @@
+use std::path::{Path, PathBuf};
+
+use serde::Deserialize;
+
+use super::{CollectionError, Source};
+use crate::formats::input::read_regular;
+
+#[derive(Deserialize)]
+struct Manifest {
+    scans: Vec<Entry>,
+}
+
+#[derive(Deserialize)]
+struct Entry {
+    name: String,
+    mesh: PathBuf,
+    landmarks: PathBuf,
+}
+
+/// The scans that a manifest lists.
+pub(super) fn sources(path: &Path) -> Result<Vec<Source>, CollectionError> {
+    let bytes =
+        read_regular(path).map_err(|error| CollectionError::Unreadable { path: path.to_owned(), error })?;
+    let manifest: Manifest = serde_json::from_slice(&bytes)
+        .map_err(|error| CollectionError::Manifest { path: path.to_owned(), problem: error.to_string() })?;
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let source = |entry: Entry| Source {
+        name: entry.name,
+        mesh: folder.join(entry.mesh),
+        landmarks: folder.join(entry.landmarks),
+    };
+    Ok(manifest.scans.into_iter().map(source).collect())
+}

@@ -1,0 +1,299 @@
+//! Collections: the scans that are registered together, from a folder or from a manifest.
+
+mod folder;
+mod manifest;
+#[cfg(test)]
+mod tests;
+
+use std::collections::BTreeSet;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use super::error::FormatError;
+use super::input::{InputFile, read_file};
+use super::{Scheme, parse_landmarks, read_mesh_and_inputs};
+use crate::mesh::{LandmarkSet, TriangleMesh};
+
+/// Scans with their landmarks, sorted by name; at least one landmark is present on all of them.
+#[derive(Debug, Clone)]
+pub struct Collection {
+    members: Vec<Member>,
+}
+
+/// One scan of a collection, its landmarks read, its mesh not yet.
+#[derive(Debug, Clone)]
+pub struct Member {
+    /// Unique in the collection, and fit to name a file.
+    pub name: String,
+    /// The mesh's file.
+    pub mesh: PathBuf,
+    /// The landmarks' file.
+    pub landmarks_file: InputFile,
+    /// The landmarks.
+    pub landmarks: LandmarkSet,
+}
+
+/// A scan that has been read whole.
+#[derive(Debug, Clone)]
+pub struct Scan {
+    /// The member's name.
+    pub name: String,
+    /// The surface, in the scan's own space.
+    pub mesh: TriangleMesh,
+    /// Its landmarks, in the same space.
+    pub landmarks: LandmarkSet,
+    /// All files it was read from: the mesh, what the mesh names, the landmarks.
+    pub inputs: Vec<InputFile>,
+}
+
+/// Why a folder or manifest makes no collection.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum CollectionError {
+    /// The folder cannot be listed, or neither folder nor manifest is there.
+    #[error("{}: cannot be read: {error}", path.display())]
+    Unreadable {
+        /// The folder.
+        path: PathBuf,
+        /// What the system says.
+        error: io::Error,
+    },
+    /// The manifest is malformed.
+    #[error("{}: is no manifest {{\"scans\": [{{\"name\", \"mesh\", \"landmarks\"}}, ...]}}: {problem}", path.display())]
+    Manifest {
+        /// The manifest.
+        path: PathBuf,
+        /// What is wrong.
+        problem: String,
+    },
+    /// No scan is there.
+    #[error("{}: holds no scan: expected NAME/scan.ply with NAME/landmarks.json, or NAME.ply with NAME.landmarks.json \
+             (ply, obj, glb or gltf)", path.display())]
+    Empty {
+        /// The folder or manifest.
+        path: PathBuf,
+    },
+    /// A folder holds several meshes and does not say which is the scan.
+    #[error("{}: holds several meshes ({}): name the one to use `scan`", path.display(), meshes.join(", "))]
+    Ambiguous {
+        /// The scan's folder.
+        path: PathBuf,
+        /// The meshes' file names.
+        meshes: Vec<String>,
+    },
+    /// A scan has no landmarks.
+    #[error("scan `{name}` has no landmarks: expected {}", expected.display())]
+    MissingLandmarks {
+        /// The scan.
+        name: String,
+        /// Where they should be.
+        expected: PathBuf,
+    },
+    /// The mesh that a manifest names is not there.
+    #[error("scan `{name}` has no mesh: {} does not exist", path.display())]
+    MissingMesh {
+        /// The scan.
+        name: String,
+        /// Where it should be.
+        path: PathBuf,
+    },
+    /// A name cannot name a result's file.
+    #[error("the scan name `{}` must not be empty, begin with a dot, or contain /, \\, : or control characters", name.escape_default())]
+    BadName {
+        /// The name.
+        name: String,
+    },
+    /// Two scans have one name.
+    #[error("two scans are named `{name}`: {} and {}", first.display(), second.display())]
+    DuplicateName {
+        /// The name.
+        name: String,
+        /// The first scan's mesh.
+        first: PathBuf,
+        /// The second scan's mesh.
+        second: PathBuf,
+    },
+    /// Two scans' landmarks are named by different schemes, so that equal names mean different points.
+    #[error(
+        "the landmarks of `{first}` are of the scheme `{first_scheme}`, those of `{second}` of `{second_scheme}`: use one"
+    )]
+    SchemesDiffer {
+        /// A scan.
+        first: String,
+        /// Its scheme.
+        first_scheme: String,
+        /// Another scan.
+        second: String,
+        /// Its scheme.
+        second_scheme: String,
+    },
+    /// The scans share no landmark.
+    #[error(
+        "no landmark is present on every scan: `{name}` has {there}, none of which all scans before it have ({before})"
+    )]
+    NoCommonLandmark {
+        /// The first scan, by name, that shares none with those before it.
+        name: String,
+        /// Some of its landmarks.
+        there: String,
+        /// Some that the scans before it share.
+        before: String,
+    },
+    /// A file of a scan cannot be read.
+    #[error("scan `{name}`: {error}")]
+    Scan {
+        /// The scan.
+        name: String,
+        /// What is wrong, and in which file.
+        error: FormatError,
+    },
+}
+
+/// Where a scan's files are.
+struct Source {
+    name: String,
+    mesh: PathBuf,
+    landmarks: PathBuf,
+}
+
+impl Collection {
+    /// Opens a folder of scans or a JSON manifest, and reads all landmarks. Meshes are read by [`Member::read`].
+    ///
+    /// A folder holds `NAME/scan.ply` with `NAME/landmarks.json`, or `NAME.ply` with `NAME.landmarks.json`, where the
+    /// mesh may also be OBJ, GLB or glTF; of several meshes in `NAME/`, that called `scan` is taken. Folders without a
+    /// mesh and names that begin with a dot are passed over. A manifest is
+    /// `{"scans": [{"name": "...", "mesh": "path", "landmarks": "path"}, ...]}`, paths relative to its folder.
+    ///
+    /// # Errors
+    /// [`CollectionError`] names the scan or the file, and what was expected.
+    pub fn open(path: impl AsRef<Path>) -> Result<Self, CollectionError> {
+        let path = path.as_ref();
+        let mut sources = if path.is_dir() { folder::sources(path)? } else { manifest::sources(path)? };
+        if sources.is_empty() {
+            return Err(CollectionError::Empty { path: path.to_owned() });
+        }
+        sources.sort_by(|a, b| a.name.cmp(&b.name));
+        check_names(&sources)?;
+        let members = sources.into_iter().map(Member::open).collect::<Result<Vec<_>, _>>()?;
+        check_schemes(&members)?;
+        check_common(&members)?;
+        Ok(Self { members })
+    }
+
+    /// Its members, sorted by name.
+    pub fn members(&self) -> &[Member] {
+        &self.members
+    }
+
+    /// The names of the landmarks that are present on every scan, in the order of the first scan.
+    pub fn common_landmarks(&self) -> Vec<&str> {
+        let first = self.members[0].landmarks.present().map(|(name, _)| name);
+        let common = common_names(&self.members).unwrap_or_default();
+        first.filter(|name| common.contains(name)).collect()
+    }
+
+    /// The landmark scheme that the scans state, if any does.
+    pub fn scheme(&self) -> Option<&str> {
+        self.members.iter().find_map(|member| member.landmarks.scheme.as_deref())
+    }
+}
+
+impl Member {
+    fn open(source: Source) -> Result<Self, CollectionError> {
+        let Source { name, mesh, landmarks: file } = source;
+        if !mesh.exists() {
+            return Err(CollectionError::MissingMesh { name, path: mesh });
+        }
+        if !file.exists() {
+            return Err(CollectionError::MissingLandmarks { name, expected: file });
+        }
+        let read = || {
+            let bytes = read_file(&file)?;
+            let landmarks = parse_landmarks(&bytes).map_err(|error| error.in_file(&file))?;
+            Ok((InputFile::of(&file, &bytes), landmarks))
+        };
+        match read() {
+            Ok((landmarks_file, landmarks)) => Ok(Self { name, mesh, landmarks_file, landmarks }),
+            Err(error) => Err(CollectionError::Scan { name, error }),
+        }
+    }
+
+    /// Reads the scan's mesh.
+    ///
+    /// # Errors
+    /// [`CollectionError::Scan`] with the file and what is wrong in it.
+    pub fn read(&self) -> Result<Scan, CollectionError> {
+        let (mesh, mut inputs) = read_mesh_and_inputs(&self.mesh)
+            .map_err(|error| CollectionError::Scan { name: self.name.clone(), error })?;
+        inputs.push(self.landmarks_file.clone());
+        Ok(Scan { name: self.name.clone(), mesh, landmarks: self.landmarks.clone(), inputs })
+    }
+}
+
+fn check_names(sources: &[Source]) -> Result<(), CollectionError> {
+    let unfit = |name: &str| {
+        name.is_empty()
+            || name.starts_with('.')
+            || name.contains(|c: char| c.is_control() || "/\\:".contains(c))
+    };
+    if let Some(source) = sources.iter().find(|source| unfit(&source.name)) {
+        return Err(CollectionError::BadName { name: source.name.clone() });
+    }
+    match sources.windows(2).find(|pair| pair[0].name == pair[1].name) {
+        Some([first, second]) => Err(CollectionError::DuplicateName {
+            name: first.name.clone(),
+            first: first.mesh.clone(),
+            second: second.mesh.clone(),
+        }),
+        _ => Ok(()),
+    }
+}
+
+fn check_schemes(members: &[Member]) -> Result<(), CollectionError> {
+    let known = |name: &str| Scheme::named(name).map_or(name.to_owned(), |scheme| scheme.name.to_owned());
+    let mut stated = members.iter().filter_map(|member| Some((member, member.landmarks.scheme.as_deref()?)));
+    let Some((first, first_scheme)) = stated.next() else {
+        return Ok(());
+    };
+    match stated.find(|(_, scheme)| known(scheme) != known(first_scheme)) {
+        Some((second, second_scheme)) => Err(CollectionError::SchemesDiffer {
+            first: first.name.clone(),
+            first_scheme: first_scheme.to_owned(),
+            second: second.name.clone(),
+            second_scheme: second_scheme.to_owned(),
+        }),
+        None => Ok(()),
+    }
+}
+
+fn check_common(members: &[Member]) -> Result<(), CollectionError> {
+    common_names(members).map(|_| ()).map_err(|(member, before)| CollectionError::NoCommonLandmark {
+        name: member.name.clone(),
+        there: some_of(&present_names(member)),
+        before: some_of(&before),
+    })
+}
+
+/// The landmarks present on all members, or the first member that shares none with those before it, and what they share.
+fn common_names(members: &[Member]) -> Result<BTreeSet<&str>, (&Member, BTreeSet<&str>)> {
+    let mut common = members.first().map(present_names).unwrap_or_default();
+    for member in members {
+        let shared: BTreeSet<_> = common.intersection(&present_names(member)).copied().collect();
+        if shared.is_empty() {
+            return Err((member, common));
+        }
+        common = shared;
+    }
+    Ok(common)
+}
+
+fn present_names(member: &Member) -> BTreeSet<&str> {
+    member.landmarks.present().map(|(name, _)| name).collect()
+}
+
+fn some_of(names: &BTreeSet<&str>) -> String {
+    const MOST: usize = 5;
+    let some: Vec<_> = names.iter().take(MOST).map(|name| format!("`{name}`")).collect();
+    let more = if names.len() > MOST { ", ..." } else { "" };
+    some.join(", ") + more
+}

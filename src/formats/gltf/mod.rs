@@ -1,0 +1,31 @@
+//! glTF 2.0 and its binary container GLB: the triangles of the default scene, in the scene's space.
+//!
+//! Skins are taken in their bind pose and morph targets at weight zero, which is how a scan is stored.
+
+mod accessor;
+mod buffer;
+mod container;
+mod document;
+mod scene;
+#[cfg(test)]
+mod tests;
+mod weld;
+
+use super::error::Fault;
+use super::geometry::Geometry;
+use super::glb;
+use super::input::Siblings;
+use buffer::Buffers;
+use container::Container;
+use document::Document;
+
+/// Reads all triangles, strips and fans of the scene, each node's transform applied, and closes their seams.
+pub(super) fn read(bytes: &[u8], siblings: &Siblings) -> Result<Geometry, Fault> {
+    let container = Container::split(bytes)?;
+    let document = Document::parse(container.json)?;
+    let buffers = Buffers::new(&document, container.binary, siblings, bytes.len());
+    let geometry = scene::gather(&buffers)?;
+    // What this program wrote has no seams, and its vertex order is what it is kept for.
+    let own = document.asset()?.generator.is_some_and(|name| name.starts_with(glb::PROGRAM));
+    Ok(if own { geometry } else { weld::weld(geometry) })
+}

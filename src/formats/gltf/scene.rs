@@ -1,0 +1,160 @@
+use std::collections::HashMap;
+
+use glam::{DMat4, DQuat, DVec3};
+
+use super::accessor;
+use super::buffer::Buffers;
+use super::document::{Node, Primitive};
+use crate::formats::error::Fault;
+use crate::formats::geometry::Geometry;
+
+/// The triangles of the default scene, in its space. A file without nodes has its meshes as they are.
+pub(super) fn gather(buffers: &Buffers) -> Result<Geometry, Fault> {
+    let document = buffers.document();
+    let mut gathered = Gathered { buffers, geometry: Geometry::default(), placed: HashMap::new(), others: 0 };
+    if document.node_count() == 0 {
+        (0..document.mesh_count()).try_for_each(|mesh| gathered.mesh(mesh, DMat4::IDENTITY))?;
+    } else {
+        gathered.nodes()?;
+    }
+    if gathered.geometry.triangles.is_empty() {
+        let problem = format!("has no triangle ({} primitives of points or lines)", gathered.others);
+        return Err(Fault::at("the default scene", problem));
+    }
+    Ok(gathered.geometry)
+}
+
+struct Gathered<'g, 'a> {
+    buffers: &'g Buffers<'a>,
+    geometry: Geometry,
+    /// First vertex and number of vertices of each accessor under each transform: primitives and meshes often share
+    /// their vertices and differ in their indices.
+    placed: HashMap<(usize, [u64; 16]), (u32, u32)>,
+    /// Primitives that are no triangles.
+    others: usize,
+}
+
+/// A node whose children are being visited.
+struct Branch {
+    transform: DMat4,
+    children: std::vec::IntoIter<usize>,
+}
+
+impl Gathered<'_, '_> {
+    /// Walks the node tree without recursion: a file may nest deeper than the stack.
+    fn nodes(&mut self) -> Result<(), Fault> {
+        let document = self.buffers.document();
+        let mut seen = vec![false; document.node_count()];
+        let roots = document.roots()?;
+        let mut branches = vec![Branch { transform: DMat4::IDENTITY, children: roots.into_iter() }];
+        while let Some(branch) = branches.last_mut() {
+            let Some(index) = branch.children.next() else {
+                branches.pop();
+                continue;
+            };
+            let parent = branch.transform;
+            let node = document.node(index)?;
+            if std::mem::replace(&mut seen[index], true) {
+                let problem = "is reached twice: nodes must form a tree, without cycles and shared children";
+                return Err(Fault::at(format_args!("nodes[{index}]"), problem));
+            }
+            let transform = self.node(index, &node, parent)?;
+            branches.push(Branch { transform, children: node.children.into_iter() });
+        }
+        Ok(())
+    }
+
+    /// Adds a node's mesh; returns its transform to the scene.
+    fn node(&mut self, index: usize, node: &Node, parent: DMat4) -> Result<DMat4, Fault> {
+        let transform = parent * local_transform(node);
+        if !transform.is_finite() {
+            return Err(Fault::at(format_args!("nodes[{index}]"), "has a transform that is not finite"));
+        }
+        if let Some(mesh) = node.mesh {
+            // A skin places its mesh by its joints, not by the node.
+            self.mesh(mesh, if node.skin.is_some() { DMat4::IDENTITY } else { transform })?;
+        }
+        Ok(transform)
+    }
+
+    fn mesh(&mut self, index: usize, transform: DMat4) -> Result<(), Fault> {
+        for (at, primitive) in self.buffers.document().mesh(index)?.primitives.iter().enumerate() {
+            if !(4..=6).contains(&primitive.mode) {
+                self.others += 1;
+                continue;
+            }
+            let place = format!("meshes[{index}].primitives[{at}]");
+            let position = primitive.attributes.position;
+            let accessor =
+                position.ok_or_else(|| Fault::at(&place, "has no POSITION: its vertices are lost"))?;
+            let key = (accessor, transform.to_cols_array().map(f64::to_bits));
+            let range = match self.placed.get(&key) {
+                Some(&range) => range,
+                None => self.vertices(accessor, transform)?,
+            };
+            self.placed.insert(key, range);
+            self.primitive(primitive, range, transform.determinant() < 0.0, &place)?;
+        }
+        Ok(())
+    }
+
+    /// Adds an accessor's positions; returns the first one's index and their number.
+    fn vertices(&mut self, accessor: usize, transform: DMat4) -> Result<(u32, u32), Fault> {
+        let positions = accessor::positions(self.buffers, accessor)?;
+        let range =
+            u32::try_from(self.geometry.positions.len()).ok().zip(u32::try_from(positions.len()).ok());
+        let fits = range.filter(|(first, count)| first.checked_add(*count).is_some());
+        let range = fits
+            .ok_or_else(|| Fault::at("the default scene", "has more vertices than 32-bit indices reach"))?;
+        self.geometry.positions.extend(positions.into_iter().map(|p| transform.transform_point3(p)));
+        Ok(range)
+    }
+
+    fn primitive(
+        &mut self,
+        primitive: &Primitive,
+        (first, count): (u32, u32),
+        mirrored: bool,
+        place: &str,
+    ) -> Result<(), Fault> {
+        let indices = match primitive.indices {
+            Some(accessor) => accessor::indices(self.buffers, accessor)?,
+            None => (0..count).collect(),
+        };
+        if let Some(index) = indices.iter().find(|&&index| index >= count) {
+            let problem = format!("names vertex {index}, but has {count}, counted from 0");
+            return Err(Fault::at(place, problem));
+        }
+        if primitive.mode == 4 && indices.len() % 3 != 0 {
+            let problem = format!("has {} indices, which do not make whole triangles", indices.len());
+            return Err(Fault::at(place, problem));
+        }
+        let turned = |[a, b, c]: [u32; 3]| if mirrored { [a, c, b] } else { [a, b, c] };
+        let triangles = triangles(primitive.mode, &indices);
+        self.geometry.triangles.extend(triangles.map(|corners| turned(corners.map(|index| first + index))));
+        Ok(())
+    }
+}
+
+/// Corners of the triangles (4), strip (5) or fan (6), all turning the same way.
+fn triangles(mode: u32, indices: &[u32]) -> impl Iterator<Item = [u32; 3]> {
+    let count = if mode == 4 { indices.len() / 3 } else { indices.len().saturating_sub(2) };
+    (0..count).map(move |i| match mode {
+        4 => [indices[3 * i], indices[3 * i + 1], indices[3 * i + 2]],
+        5 => [indices[i], indices[i + 1 + i % 2], indices[i + 2 - i % 2]],
+        _ => [indices[i + 1], indices[i + 2], indices[0]],
+    })
+}
+
+fn local_transform(node: &Node) -> DMat4 {
+    if let Some(matrix) = &node.matrix {
+        return DMat4::from_cols_array(matrix);
+    }
+    let rotation = DQuat::from_array(node.rotation.unwrap_or([0.0, 0.0, 0.0, 1.0]));
+    // A quaternion of no length turns nothing.
+    let length = rotation.length();
+    let rotation = if length > 0.0 { rotation / length } else { DQuat::IDENTITY };
+    let scale = node.scale.map_or(DVec3::ONE, DVec3::from);
+    let translation = node.translation.map_or(DVec3::ZERO, DVec3::from);
+    DMat4::from_scale_rotation_translation(scale, rotation, translation)
+}

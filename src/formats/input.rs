@@ -1,0 +1,79 @@
+use std::cell::RefCell;
+use std::fs;
+use std::io;
+use std::path::{Component, Path, PathBuf};
+
+use super::digest::Sha256;
+use super::error::{Fault, FormatError};
+
+/// A file that was read, with the digest of the very bytes that were used.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct InputFile {
+    /// Where it was read from.
+    pub path: PathBuf,
+    /// Its size in bytes.
+    pub size: u64,
+    /// The digest of its bytes.
+    pub sha256: Sha256,
+}
+
+impl InputFile {
+    pub(super) fn of(path: &Path, bytes: &[u8]) -> Self {
+        Self { path: path.to_owned(), size: bytes.len() as u64, sha256: Sha256::of(bytes) }
+    }
+}
+
+/// The whole of a regular file; pipes and devices, which may have no end, are refused.
+pub(super) fn read_regular(path: &Path) -> io::Result<Vec<u8>> {
+    if !fs::metadata(path)?.is_file() {
+        return Err(io::Error::new(io::ErrorKind::InvalidInput, "it is not a regular file"));
+    }
+    fs::read(path)
+}
+
+pub(super) fn read_file(path: &Path) -> Result<Vec<u8>, FormatError> {
+    read_regular(path).map_err(|error| FormatError::from(Fault::Unreadable(error)).in_file(path))
+}
+
+pub(super) fn write_file(path: &Path, bytes: &[u8]) -> Result<(), FormatError> {
+    fs::write(path, bytes).map_err(|error| FormatError::from(Fault::Unwritable(error)).in_file(path))
+}
+
+/// The files beside the one being read, which it may name.
+pub(super) struct Siblings {
+    folder: Option<PathBuf>,
+    read: RefCell<Vec<InputFile>>,
+}
+
+impl Siblings {
+    /// Those in the folder of `path` and beneath it.
+    pub fn of(path: &Path) -> Self {
+        let folder = path.parent().unwrap_or(Path::new("")).to_owned();
+        Self { folder: Some(folder), read: RefCell::default() }
+    }
+
+    /// None: the bytes being read came without a folder.
+    pub fn none() -> Self {
+        Self { folder: None, read: RefCell::default() }
+    }
+
+    /// Reads the file called `name`, a path relative to the folder that stays within it.
+    pub fn read(&self, name: &str) -> Result<Vec<u8>, String> {
+        let Some(folder) = &self.folder else {
+            return Err(format!("names the file `{name}`, which is not here: embed it, or send a GLB"));
+        };
+        let stays_within = Path::new(name).components().all(|part| matches!(part, Component::Normal(_)));
+        if name.is_empty() || name.contains(':') || !stays_within {
+            return Err(format!("names `{name}`: only files in the same folder or beneath it are read"));
+        }
+        let path = folder.join(name);
+        let bytes = read_file(&path).map_err(|error| format!("names a file that fails: {error}"))?;
+        self.read.borrow_mut().push(InputFile::of(&path, &bytes));
+        Ok(bytes)
+    }
+
+    /// What was read, in that order.
+    pub fn into_read(self) -> Vec<InputFile> {
+        self.read.into_inner()
+    }
+}

@@ -1,0 +1,68 @@
+use super::text::{Lines, without_mark, words};
+
+/// The mesh formats that are read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum MeshFormat {
+    /// Wavefront OBJ.
+    Obj,
+    /// PLY: ascii, binary little-endian or binary big-endian.
+    Ply,
+    /// glTF 2.0, as JSON or as a binary container (GLB).
+    Gltf,
+}
+
+const EXTENSIONS: [(&str, MeshFormat); 4] = [
+    ("obj", MeshFormat::Obj),
+    ("ply", MeshFormat::Ply),
+    ("glb", MeshFormat::Gltf),
+    ("gltf", MeshFormat::Gltf),
+];
+const OBJ_KEYWORDS: [&[u8]; 9] = [b"v", b"vn", b"vt", b"f", b"o", b"g", b"s", b"mtllib", b"usemtl"];
+
+impl MeshFormat {
+    /// The format of a file that holds `bytes`: as its content says, or else its extension (without the dot).
+    pub fn sniff(bytes: &[u8], extension: Option<&str>) -> Option<Self> {
+        Self::of_content(bytes).or_else(|| Self::of_extension(extension?))
+    }
+
+    /// The format that files with this extension (without the dot, in any case) have.
+    pub fn of_extension(extension: &str) -> Option<Self> {
+        let found = EXTENSIONS.iter().find(|(known, _)| known.eq_ignore_ascii_case(extension));
+        found.map(|&(_, format)| format)
+    }
+
+    fn of_content(bytes: &[u8]) -> Option<Self> {
+        let text = without_mark(bytes);
+        if bytes.starts_with(b"glTF") || text.trim_ascii_start().starts_with(b"{") {
+            Some(Self::Gltf)
+        } else if bytes.starts_with(b"ply\n") || bytes.starts_with(b"ply\r") {
+            Some(Self::Ply)
+        } else {
+            looks_like_obj(text).then_some(Self::Obj)
+        }
+    }
+}
+
+/// OBJ has no mark of its own: its first line that is no comment begins with one of its keywords.
+fn looks_like_obj(text: &[u8]) -> bool {
+    let firsts = Lines::new(text).filter_map(|line| words(line.text).next());
+    let mut statements = firsts.filter(|word| !word.starts_with(b"#"));
+    statements.next().is_some_and(|word| OBJ_KEYWORDS.contains(&word))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn content_goes_before_extension() {
+        let sniff = |bytes: &[u8], extension| MeshFormat::sniff(bytes, extension);
+        assert_eq!(sniff(b"ply\nformat", Some("obj")), Some(MeshFormat::Ply));
+        assert_eq!(sniff(b"glTF\x02", Some("ply")), Some(MeshFormat::Gltf));
+        assert_eq!(sniff(b"\xEF\xBB\xBF \n{\"asset\"", None), Some(MeshFormat::Gltf));
+        assert_eq!(sniff(b"# by hand\n\nv 0 0 0", None), Some(MeshFormat::Obj));
+        assert_eq!(sniff(b"cstype bezier", Some("OBJ")), Some(MeshFormat::Obj));
+        assert_eq!(sniff(b"solid cube", Some("stl")), None);
+        assert_eq!(sniff(b"", None), None);
+    }
+}
