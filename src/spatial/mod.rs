@@ -3,6 +3,7 @@
 mod boxes;
 mod lanes;
 mod packet;
+mod search;
 mod surface_index;
 mod surface_walk;
 #[cfg(test)]

@@ -3,11 +3,9 @@ use glam::{Vec3A, Vec4};
 use super::boxes::{Bounds, Boxes};
 use super::lanes::Lanes;
 use super::packet::Packet;
+use super::search::{Best, Waiting};
 use super::tree::{Child, Target, Tree};
 use super::triangle::{TrianglePoint, closest_on_triangle};
-
-/// Children that wait in a search before it goes on in a nested one; typical searches use under 30.
-const WAITING: usize = 64;
 
 /// The nearest point of a surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -45,12 +43,6 @@ pub struct SurfaceIndex {
     boxes: Vec<Boxes>,
     /// The boxes of the unit normals under each node's children.
     normal_boxes: Vec<Boxes>,
-}
-
-/// The best triangle a search has met.
-struct Best {
-    triangle: Option<u32>,
-    cost: f32,
 }
 
 impl SurfaceIndex {
@@ -186,61 +178,21 @@ impl SurfaceIndex {
         B: Fn(usize) -> Vec4,
         P: Fn(&Packet) -> Vec4,
     {
-        let mut waiting = [(0.0, Child::NONE); WAITING];
-        let mut count = 0;
-        let mut next = Some(from);
-        while let Some(child) = next {
+        let mut waiting = Waiting::new(from);
+        while let Some(child) = waiting.next_below(best.cost) {
             match child.target() {
                 Target::Packet(at) => {
-                    let packet_of = &self.packets[at];
-                    best.improve(packet(packet_of), &packet_of.triangles);
+                    let members = &self.packets[at];
+                    best.improve(packet(members), &members.triangles);
                 }
-                Target::Node(node) if count + 4 > WAITING => {
-                    for child in self.children[node] {
-                        if child != Child::NONE {
-                            self.search(child, boxes, packet, best);
-                        }
-                    }
+                Target::Node(node) if waiting.has_room() => {
+                    waiting.add_below(best.cost, boxes(node), &self.children[node]);
                 }
                 Target::Node(node) => {
-                    let costs = boxes(node);
-                    let start = count;
-                    let mut promising = costs.cmplt(Vec4::splat(best.cost)).bitmask();
-                    while promising != 0 {
-                        let lane = promising.trailing_zeros() as usize;
-                        promising &= promising - 1;
-                        let mut at = count;
-                        while at > start && waiting[at - 1].0 < costs[lane] {
-                            waiting[at] = waiting[at - 1];
-                            at -= 1;
-                        }
-                        waiting[at] = (costs[lane], self.children[node][lane]);
-                        count += 1;
+                    for &child in self.children[node].iter().filter(|&&child| child != Child::NONE) {
+                        self.search(child, boxes, packet, best);
                     }
                 }
-            }
-            next = None;
-            while count > 0 {
-                count -= 1;
-                if waiting[count].0 < best.cost {
-                    next = Some(waiting[count].1);
-                    break;
-                }
-            }
-        }
-    }
-}
-
-impl Best {
-    /// Takes the first cheapest of four triangles if it costs less.
-    #[inline]
-    fn improve(&mut self, costs: Vec4, triangles: &[u32; 4]) {
-        if !costs.cmplt(Vec4::splat(self.cost)).any() {
-            return;
-        }
-        for (&triangle, cost) in triangles.iter().zip(costs.to_array()) {
-            if cost < self.cost {
-                *self = Self { triangle: Some(triangle), cost };
             }
         }
     }

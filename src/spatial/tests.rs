@@ -237,6 +237,28 @@ fn coincident_triangles_end() {
 }
 
 #[test]
+fn lopsided_trees_are_searched_whole() {
+    // Each triangle is a little smaller and farther in than the last, so that grouping neighbours makes a long chain.
+    let mut positions = Vec::new();
+    for k in 0..600 {
+        let at = 0.93_f32.powi(k);
+        positions.extend([
+            Vec3A::new(at, 0.0, 0.0),
+            Vec3A::new(at, 0.01 * at, 0.0),
+            Vec3A::new(at, 0.0, 0.01 * at),
+        ]);
+    }
+    let triangles: Vec<[u32; 3]> = (0..600).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
+    let index = SurfaceIndex::new(&positions, &triangles);
+    let mut random = Random(8);
+    for k in 0..300 {
+        let p = 0.95_f32.powi(k) * random.point();
+        let least = brute_distance(&positions, &triangles, p);
+        assert!((index.closest(p).distance_squared - least).abs() <= 1e-5 * least);
+    }
+}
+
+#[test]
 fn query_that_is_no_number_ends() {
     let (positions, triangles) = soup(&mut Random(6), 100, 0.1);
     let index = SurfaceIndex::new(&positions, &triangles);

@@ -1,0 +1,20 @@
+//! Figures that say how good a result is: how closely a mesh lies on its scan, and how well the same point of the
+//! shared mesh marks the same anatomical point on every scan. Layer 4.
+
+mod border;
+mod correspondence;
+mod curvature;
+mod dense_points;
+mod samples;
+mod statistics;
+mod surface;
+mod surface_figures;
+#[cfg(test)]
+mod tests;
+
+pub use correspondence::{
+    CarriedDistances, CorrespondenceCase, CorrespondenceError, CorrespondenceFigures, CorrespondenceOptions,
+    correspondence_figures,
+};
+pub use dense_points::{DensePointsError, dense_points_from_json, dense_points_from_npy};
+pub use surface_figures::{SurfaceFigures, surface_figures};
