@@ -1,6 +1,8 @@
-use super::tessellation::{Surface, Tessellation};
-use super::{Head, Spacing};
 use glam::{DQuat, DVec3};
+
+use super::Head;
+use super::spacing::Spacing;
+use super::tessellation::{Surface, Tessellation};
 
 /// A head to be triangulated.
 #[derive(Debug, Clone)]

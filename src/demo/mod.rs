@@ -25,6 +25,9 @@ mod spline;
 mod tessellation;
 mod truth;
 
+#[cfg(test)]
+mod tests;
+
 pub use anatomy::{Anatomy, Place};
 pub use expression::Expression;
 pub use head::Head;
@@ -32,4 +35,3 @@ pub use identity::{Identity, PARAMETERS, Parameter};
 pub use pose::Pose;
 pub use random::Random;
 pub use sculptor::{SculptedHead, Sculptor, Settings};
-pub use spacing::Spacing;

@@ -2,8 +2,9 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::clay::Clay;
+use super::spacing::Spacing;
 use super::tessellation::tessellate;
-use super::{Anatomy, Expression, Head, Identity, Pose, Random, Spacing, landmarks, truth};
+use super::{Anatomy, Expression, Head, Identity, Pose, Random, landmarks, truth};
 use crate::mesh::{LandmarkSet, TriangleMesh};
 
 /// Makes collections of heads. The same seed and settings make the same heads, byte for byte.

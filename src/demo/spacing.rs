@@ -5,7 +5,7 @@ use super::brush::{mirror, rise};
 
 /// How long edges should be on one head: short where there is much to see, and everywhere a little as chance has it.
 #[derive(Debug, Clone)]
-pub struct Spacing {
+pub(super) struct Spacing {
     factor: f64,
     /// Directions across the skull along which lengths swell and ebb, and their phases.
     waves: [(DVec3, f64); 3],
@@ -23,7 +23,7 @@ const DETAILS: [(DVec3, DVec3, f64); 5] = [
 const PLAIN: f64 = 0.6;
 
 impl Spacing {
-    /// Lengths of one head's own, before [`Spacing::times`] brings them to a number of triangles.
+    /// Lengths of one head's own, before [`Self::times`] brings them to a number of triangles.
     pub fn random(random: &mut Random) -> Self {
         let wave = |_| {
             let pace = random.between(0.2, 0.5);

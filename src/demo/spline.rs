@@ -42,15 +42,13 @@ fn bends<const D: usize>(at: &[f64], values: &[[f64; D]]) -> Vec<[f64; D]> {
         let [before, after] = [at[i] - at[i - 1], at[i + 1] - at[i]];
         let pivot = 2.0 * (before + after) - before * upper[i - 1];
         upper[i] = after / pivot;
-        for d in 0..D {
+        bends[i] = std::array::from_fn(|d| {
             let turn = (values[i + 1][d] - values[i][d]) / after - (values[i][d] - values[i - 1][d]) / before;
-            bends[i][d] = (6.0 * turn - before * bends[i - 1][d]) / pivot;
-        }
+            (6.0 * turn - before * bends[i - 1][d]) / pivot
+        });
     }
     for i in (1..last).rev() {
-        for d in 0..D {
-            bends[i][d] -= upper[i] * bends[i + 1][d];
-        }
+        bends[i] = std::array::from_fn(|d| bends[i][d] - upper[i] * bends[i + 1][d]);
     }
     bends
 }

@@ -6,7 +6,7 @@ use glam::{DQuat, DVec3};
 ///
 /// Its triangles are counter-clockwise on the sphere throughout, so it never folds over itself there.
 #[derive(Debug, Clone)]
-pub struct Tessellation {
+pub(super) struct Tessellation {
     /// Unit directions of the vertices `[N, 3]`.
     pub directions: Vec<DVec3>,
     /// Positions of the vertices `[N, 3]`.
@@ -16,7 +16,7 @@ pub struct Tessellation {
 }
 
 /// What is to be triangulated.
-pub trait Surface {
+pub(super) trait Surface {
     /// The point in a unit direction.
     fn point(&self, direction: DVec3) -> DVec3;
     /// The edge length wanted there.
@@ -24,13 +24,13 @@ pub trait Surface {
 }
 
 /// Triangulates a surface: divides a turned icosahedron where edges are too long, then flips and relaxes them.
-pub fn tessellate(surface: &impl Surface, turn: DQuat) -> Tessellation {
+pub(super) fn tessellate(surface: &impl Surface, turn: DQuat) -> Tessellation {
     const FREQUENCY: u32 = 20;
     const DIVISIONS: usize = 8;
     let mut mesh = Tessellation::icosphere(surface, FREQUENCY, turn);
     for _ in 0..DIVISIONS {
         let divided = mesh.divide(surface);
-        mesh.improve(surface, 2);
+        mesh.improve(surface, 1);
         if divided == 0 {
             break;
         }
