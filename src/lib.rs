@@ -1,6 +1,7 @@
 //! onemesh: one mesh for every face.
 
 pub mod demo;
+pub mod density;
 pub mod energy;
 pub mod evaluate;
 pub mod formats;

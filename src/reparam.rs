@@ -17,7 +17,11 @@ impl Reparameterization {
     ///
     /// # Errors
     /// [`NotPositiveDefinite`] for a lambda so negative that the matrix is not.
-    pub fn new(topology: &Topology, dissection: &Dissection, lambda: f64) -> Result<Self, NotPositiveDefinite> {
+    pub fn new(
+        topology: &Topology,
+        dissection: &Dissection,
+        lambda: f64,
+    ) -> Result<Self, NotPositiveDefinite> {
         let matrix = SymmetricMatrix::diffusion(topology, lambda);
         let cholesky = SparseCholesky::new(topology, &matrix, dissection)?;
         Ok(Self { matrix, cholesky })

@@ -47,7 +47,8 @@ impl TemplateToScan<'_> {
     pub fn add(&self, shape: Shape, weight: f32, gradient: &mut Gradient) -> f64 {
         let scale = weight / self.matches.len() as f32;
         let mut sum = 0.0;
-        for ((matched, &p), gradient) in self.matches.iter().zip(shape.positions).zip(&mut gradient.positions) {
+        for ((matched, &p), gradient) in self.matches.iter().zip(shape.positions).zip(&mut gradient.positions)
+        {
             if matched.weight > 0.0 {
                 let difference = p - matched.point;
                 let (value, factor) = self.pull.at(difference.length());

@@ -11,7 +11,7 @@ mod normal;
 mod shape;
 
 pub use adaptation::Adaptation;
-pub use chamfer::{Pull, ScanToTemplate, SampleMatch, TemplateToScan, VertexMatch};
+pub use chamfer::{Pull, SampleMatch, ScanToTemplate, TemplateToScan, VertexMatch};
 pub use foldover::Foldover;
 pub use landmark::{LandmarkPull, Landmarks};
 pub use normal::{SampleNormals, VertexNormals};

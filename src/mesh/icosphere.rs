@@ -22,8 +22,7 @@ impl Icosphere {
         let mut sphere = icosahedron();
         for _ in 0..level {
             let midpoints = Midpoints::of(sphere.positions.len(), &sphere.triangles);
-            sphere.positions = midpoints
-                .interpolate(&sphere.positions, |a, b| (a + b).normalize());
+            sphere.positions = midpoints.interpolate(&sphere.positions, |a, b| (a + b).normalize());
             sphere.triangles = midpoints.triangles;
         }
         sphere

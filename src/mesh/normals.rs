@@ -54,6 +54,11 @@ impl Normals {
         self.area_vectors[triangle].normalize_or_zero()
     }
 
+    /// Mean length of the area vectors: twice the mean triangle area.
+    pub fn mean_area_vector(&self) -> f32 {
+        self.area_vectors.iter().map(|e| e.length()).sum::<f32>() / self.area_vectors.len().max(1) as f32
+    }
+
     /// Adds to `gradient` `[N, 3]` the pull-back of `upstream`, a gradient with respect to the vertex normals `[N, 3]`.
     ///
     /// h_i = (g_i - n_i (n_i . g_i)) / |s_i|, then for each triangle (a, b, c) with H the sum of h over its corners,

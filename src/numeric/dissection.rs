@@ -24,7 +24,8 @@ impl Dissection {
     /// Dissects by planes through rest positions `[N, 3]`: of thirteen directions and three places each, the cut with
     /// the smallest separator.
     pub fn new(topology: &Topology, positions: &[Vec3A]) -> Self {
-        let mut cutter = Cutter { topology, positions, side: vec![Side::Outside; positions.len()], order: Vec::new() };
+        let mut cutter =
+            Cutter { topology, positions, side: vec![Side::Outside; positions.len()], order: Vec::new() };
         let all: Vec<u32> = (0..positions.len() as u32).collect();
         let (second, separator) = cutter.dissect(all);
         Self { order: cutter.order, second, separator }
@@ -100,7 +101,12 @@ impl Cutter<'_> {
             self.side[v as usize] = if i < half { Side::First } else { Side::Second };
         }
         let cover = smallest_cover(&sorted[..half], |v| {
-            self.topology.neighbours.row(v as usize).iter().copied().filter(|&w| self.side[w as usize] == Side::Second)
+            self.topology
+                .neighbours
+                .row(v as usize)
+                .iter()
+                .copied()
+                .filter(|&w| self.side[w as usize] == Side::Second)
         });
         for &v in sorted {
             self.side[v as usize] = Side::Outside;

@@ -82,7 +82,8 @@ impl ColumnGroup {
 impl SupernodalFactor {
     /// Packs the columns of a factor made in the order of `dissection`.
     pub fn new(columns: &ColumnFactor, dissection: &Dissection) -> Self {
-        let [first, second, top] = dissection.parts().map(|own| Part::new(columns, own, dissection.separator));
+        let [first, second, top] =
+            dissection.parts().map(|own| Part::new(columns, own, dissection.separator));
         Self { first, second, top }
     }
 

@@ -1,178 +1,269 @@
-//! Stage 1: the sphere template to one scan.
+//! The sphere template to one scan, without landmarks (fit) or with them (register).
+
+use std::sync::Arc;
 
 use glam::Vec3A;
+use rayon::prelude::*;
 
-use super::scan_surface::{ScanSurface, refresh};
-use crate::energy::*;
-use crate::mesh::{Icosphere, Midpoints, Normals, Topology, mean_edge_lengths};
-use crate::numeric::{AdamUniform, Dissection, SolveBuffer};
+use super::observer::{Canceled, Watch};
+use super::scan_surface::ScanSurface;
+use super::settings::{Density, FitSettings, LevelSettings, Ramp};
+use super::sphere::Sphere;
+use crate::density::{CurvatureDensity, uniform_lengths};
+use crate::energy::{
+    Adaptation, Foldover, Gradient, LandmarkPull, Landmarks, Pull, SampleMatch, SampleNormals,
+    ScanToTemplate, Shape, TemplateToScan, VertexMatch, VertexNormals,
+};
+use crate::mesh::{Normals, SurfacePoint, mean_edge_lengths};
+use crate::numeric::{AdamUniform, SolveBuffer};
 use crate::reparam::Reparameterization;
 use crate::spatial::SurfaceIndex;
 
-#[derive(Debug, Clone)]
-pub struct LevelSettings {
-    pub level: u32,
-    pub iterations: usize,
-    pub lambda: f64,
-    pub rate: f32,
-    pub rate_end: f32,
-    pub every: usize,
-    pub samples: usize,
-    pub kn: [f32; 2],
-    pub wn: [f32; 2],
-    pub uniform: [f32; 2],
-    pub fold: [f32; 2],
-    pub huber: f32,
-    pub landmark: [f32; 2],
+/// Search trees of a deforming template are rebuilt after this many refits.
+const REFITS: usize = 40;
+
+/// A landmark for every level to pull: its place on the unit sphere, and on the scan in unit space.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SphereLandmark {
+    /// Direction from the sphere's centre.
+    pub on_sphere: glam::DVec3,
+    /// The scan's landmark.
+    pub target: Vec3A,
 }
 
-fn mix(range: [f32; 2], x: f32) -> f32 {
-    range[0] + (range[1] - range[0]) * x
-}
-
-pub fn deform_level(
+/// Deforms the sphere to a scan, level after level; returns positions `[N, 3]` in unit space on the last level's sphere.
+///
+/// # Errors
+/// [`Canceled`] if the observer asked to stop.
+pub fn fit(
     scan: &ScanSurface,
-    topology: &Topology,
-    reparam: &Reparameterization,
-    s: &LevelSettings,
-    mut p: Vec<Vec3A>,
-    landmarks: &[LandmarkPull],
-    verbose: bool,
-) -> Vec<Vec3A> {
-    let n = p.len();
-    let mut u = reparam.parameters(topology, &p);
-    let mut adam = AdamUniform::new(n);
-    let mut buffer = SolveBuffer::default();
-    let mut normals = Normals::new(topology, &p);
-    let mut index = SurfaceIndex::new(&p, &topology.triangles);
-    let mut vm = vec![VertexMatch::default(); n];
-    let mut sm = vec![SampleMatch::default(); s.samples];
-    let mut gradient = Gradient::zero(topology);
-    let mut vhint: Vec<u32> = vec![0; n];
-    let mut times = [0f64; 5];
-    for it in 0..s.iterations {
-        let x = it as f32 / s.iterations as f32;
-        let kn = mix(s.kn, x);
-        let k2 = kn * kn;
-        let t0 = std::time::Instant::now();
-        p.copy_from_slice(&u);
-        reparam.to_positions(&mut p, &mut buffer);
-        normals.update(topology, &p);
-        times[0] += t0.elapsed().as_secs_f64();
-        if it % s.every == 0 {
-            let t0 = std::time::Instant::now();
-            let (pp, nn) = (&p, &normals.vertices);
-            let hints = std::mem::take(&mut vhint);
-            let found: Vec<_> = {
-                use rayon::prelude::*;
-                (0..n)
-                    .into_par_iter()
-                    .with_min_len(128)
-                    .map(|i| scan.index.closest_oriented(pp[i], nn[i], k2, 0.0, f32::INFINITY, Some(hints[i])))
-                    .collect()
-            };
-            vhint = hints;
-            for (i, hit) in found.iter().enumerate() {
-                vm[i] = match hit {
-                    Some(hit) => {
-                        vhint[i] = hit.triangle;
-                        VertexMatch {
-                            point: hit.point,
-                            normal: scan.normal_at(hit),
-                            weight: if scan.on_rim(hit) { 0.0 } else { 1.0 },
-                        }
-                    }
-                    None => VertexMatch::default(),
-                };
-            }
-            times[1] += t0.elapsed().as_secs_f64();
-            let t0 = std::time::Instant::now();
-            if it % (s.every * 40) == 0 {
-                index = SurfaceIndex::new(&p, &topology.triangles);
-            } else {
-                index.refit(&p);
-            }
-            let offset = (it / s.every) * s.samples;
-            refresh(&mut sm, |i, m| {
-                let sample = scan.samples[(offset + i) % scan.samples.len()];
-                *m = match index.closest_oriented(sample.point, sample.normal, k2, -0.3, f32::INFINITY, None) {
-                    Some(hit) => SampleMatch {
-                        triangle: hit.triangle,
-                        weight: 1.0,
-                        weights: hit.weights,
-                        point: sample.point,
-                        normal: sample.normal,
-                    },
-                    None => SampleMatch::default(),
-                };
-            });
-            times[2] += t0.elapsed().as_secs_f64();
+    settings: &FitSettings,
+    landmarks: &[SphereLandmark],
+    watch: &Watch,
+) -> Result<Vec<Vec3A>, Canceled> {
+    let mut positions: Vec<Vec3A> = Vec::new();
+    let mut done = 0;
+    for level in &settings.levels {
+        let sphere = Sphere::of_level(level.level);
+        positions = if positions.is_empty() {
+            sphere.rest.iter().map(|p| *p * settings.start_radius).collect()
+        } else {
+            sphere.subdivide(&positions)
+        };
+        let pulls = landmark_pulls(&sphere, landmarks);
+        let mut deformation = Deformation::new(scan, &sphere, level, positions, pulls);
+        for iteration in 0..level.iterations {
+            let energy = deformation.step(iteration);
+            watch.step(done + iteration + 1, energy)?;
         }
-        let t0 = std::time::Instant::now();
-        gradient.clear(topology);
-        let shape = Shape { topology, positions: &p, normals: &normals };
-        let pull = if s.huber > 0.0 { Pull::Huber(s.huber) } else { Pull::Distance };
-        let wn = mix(s.wn, x);
-        let mean_area =
-            normals.area_vectors.iter().map(|a| a.length()).sum::<f32>() / normals.area_vectors.len() as f32;
-        let floor = 0.2 * mean_area;
-        let mut e = [0.0; 6];
-        e[0] = TemplateToScan { matches: &vm, pull }.add(shape, 1.0, &mut gradient);
-        e[1] = ScanToTemplate { matches: &sm, pull }.add(shape, 1.0, &mut gradient);
-        e[2] = VertexNormals { matches: &vm }.add(shape, wn, &mut gradient);
-        e[3] = SampleNormals { matches: &sm, floor }.add(shape, wn, &mut gradient);
-        let wu = mix(s.uniform, x);
-        if wu > 0.0 {
-            let lengths = mean_edge_lengths(topology, &p);
-            let mean = lengths.iter().sum::<f32>() / n as f32;
-            let desired = vec![mean; n];
-            e[4] = Adaptation { lengths: &lengths, desired: &desired }.add(shape, wu, &mut gradient);
-        }
-        let wf = mix(s.fold, x);
-        if wf > 0.0 {
-            e[5] = Foldover { cosine: 0.0, floor }.add(shape, wf, &mut gradient);
-        }
-        let wl = mix(s.landmark, x);
-        if !landmarks.is_empty() && wl > 0.0 {
-            e[5] = Landmarks { pulls: landmarks }.add(shape, wl, &mut gradient);
-        }
-        times[3] += t0.elapsed().as_secs_f64();
-        let t0 = std::time::Instant::now();
-        let g = gradient.total(shape);
-        reparam.pull_back(g, &mut buffer);
-        let rate = s.rate * s.rate_end.powf(x);
-        adam.step(&mut u, g, rate);
-        times[4] += t0.elapsed().as_secs_f64();
-        if verbose && (it % 50 == 0 || it + 1 == s.iterations) {
-            println!("{} {it} {e:.5?}", s.level);
-        }
+        done += level.iterations;
+        positions = deformation.finish();
     }
-    if verbose {
-        println!("times solve+normals {:.3} t2s {:.3} s2t {:.3} energies {:.3} back {:.3}", times[0], times[1], times[2], times[3], times[4]);
-    }
-    p.copy_from_slice(&u);
-    reparam.to_positions(&mut p, &mut buffer);
-    p
+    Ok(positions)
 }
 
-pub fn fit(scan: &ScanSurface, levels: &[LevelSettings], radius: f32, landmarks: &dyn Fn(u32) -> Vec<LandmarkPull>, verbose: bool) -> (Vec<Vec3A>, Vec<[u32; 3]>) {
-    let mut p: Vec<Vec3A> = Vec::new();
-    let mut triangles = Vec::new();
-    for (k, s) in levels.iter().enumerate() {
-        let sphere = Icosphere::new(s.level);
-        let rest: Vec<Vec3A> = sphere.positions.iter().map(|p| p.as_vec3a()).collect();
-        let topology = Topology::new(rest.len(), &sphere.triangles);
-        if k == 0 {
-            p = rest.iter().map(|p| *p * radius).collect();
-        } else {
-            let coarse = Icosphere::new(s.level - 1);
-            let midpoints = Midpoints::of(coarse.positions.len(), &coarse.triangles);
-            p = midpoints.subdivide(&p);
+fn landmark_pulls(sphere: &Sphere, landmarks: &[SphereLandmark]) -> Vec<LandmarkPull> {
+    let points: Vec<SurfacePoint> = sphere.surface_points(landmarks.iter().map(|l| l.on_sphere));
+    let pull = |(point, landmark): (SurfacePoint, &SphereLandmark)| LandmarkPull {
+        triangle: point.triangle.0,
+        weights: point.weights.map(|w| w as f32),
+        target: landmark.target,
+        weight: 1.0,
+    };
+    points.into_iter().zip(landmarks).map(pull).collect()
+}
+
+/// One level's optimisation: AdamUniform on u, the energies of the paper and ours.
+struct Deformation<'a> {
+    scan: &'a ScanSurface,
+    sphere: &'a Sphere,
+    settings: &'a LevelSettings,
+    landmarks: Vec<LandmarkPull>,
+    reparameterization: Arc<Reparameterization>,
+    curvature: Option<Arc<CurvatureDensity>>,
+    adam: AdamUniform,
+    u: Vec<Vec3A>,
+    positions: Vec<Vec3A>,
+    normals: Normals,
+    gradient: Gradient,
+    index: SurfaceIndex,
+    vertex_matches: Vec<VertexMatch>,
+    /// The scan triangle each vertex was matched to: the next search begins there.
+    hints: Vec<u32>,
+    sample_matches: Vec<SampleMatch>,
+    buffer: SolveBuffer,
+}
+
+fn at(ramp: Ramp, x: f32) -> f32 {
+    ramp[0] + (ramp[1] - ramp[0]) * x
+}
+
+impl<'a> Deformation<'a> {
+    fn new(
+        scan: &'a ScanSurface,
+        sphere: &'a Sphere,
+        settings: &'a LevelSettings,
+        positions: Vec<Vec3A>,
+        landmarks: Vec<LandmarkPull>,
+    ) -> Self {
+        let reparameterization = sphere.reparameterization(settings.lambda);
+        let topology = &sphere.topology;
+        let scheduled = matches!(settings.density, Density::Scheduled { .. });
+        Self {
+            scan,
+            sphere,
+            settings,
+            landmarks,
+            u: reparameterization.parameters(topology, &positions),
+            reparameterization,
+            curvature: scheduled.then(|| sphere.curvature_density()),
+            adam: AdamUniform::new(positions.len()),
+            normals: Normals::new(topology, &positions),
+            gradient: Gradient::zero(topology),
+            index: SurfaceIndex::new(&positions, &topology.triangles),
+            vertex_matches: vec![VertexMatch::default(); positions.len()],
+            hints: vec![0; positions.len()],
+            sample_matches: vec![SampleMatch::default(); settings.samples],
+            positions,
+            buffer: SolveBuffer::default(),
         }
-        let dissection = Dissection::new(&topology, &rest);
-        let reparam = Reparameterization::new(&topology, &dissection, s.lambda).expect("positive");
-        p = deform_level(scan, &topology, &reparam, s, p, &landmarks(s.level), verbose);
-        triangles = sphere.triangles;
     }
-    (p, triangles)
+
+    /// One iteration; returns the energy before it.
+    fn step(&mut self, iteration: usize) -> f64 {
+        let x = iteration as f32 / self.settings.iterations as f32;
+        self.update_positions();
+        if iteration.is_multiple_of(self.settings.refresh.max(1)) {
+            let round = iteration / self.settings.refresh.max(1);
+            self.match_vertices(x);
+            self.match_samples(x, round);
+        }
+        let energy = self.add_energies(x);
+        let shape =
+            Shape { topology: &self.sphere.topology, positions: &self.positions, normals: &self.normals };
+        let gradient = self.gradient.total(shape);
+        self.reparameterization.pull_back(gradient, &mut self.buffer);
+        self.adam.step(&mut self.u, gradient, self.settings.rate * self.settings.rate_end.powf(x));
+        energy
+    }
+
+    fn finish(mut self) -> Vec<Vec3A> {
+        self.update_positions();
+        self.positions
+    }
+
+    fn update_positions(&mut self) {
+        self.positions.copy_from_slice(&self.u);
+        self.reparameterization.to_positions(&mut self.positions, &mut self.buffer);
+        self.normals.update(&self.sphere.topology, &self.positions);
+    }
+
+    /// The closest scan point of every template vertex, in position and normal together.
+    fn match_vertices(&mut self, x: f32) {
+        let Self { scan, settings, positions, normals, hints, vertex_matches, .. } = self;
+        let search = at(settings.normal_search, x);
+        vertex_matches.par_iter_mut().zip(hints).enumerate().with_min_len(128).for_each(
+            |(i, (matched, hint))| {
+                let hit = scan.index.closest_oriented(
+                    positions[i],
+                    normals.vertices[i],
+                    search * search,
+                    settings.least_cosine,
+                    f32::INFINITY,
+                    Some(*hint),
+                );
+                *matched = hit.map_or(VertexMatch::default(), |hit| {
+                    *hint = hit.triangle;
+                    let weight = if scan.on_rim(&hit) { 0.0 } else { 1.0 };
+                    VertexMatch { point: hit.point, normal: scan.normal_at(&hit), weight }
+                });
+            },
+        );
+    }
+
+    /// The closest template point of scan samples, other ones each round.
+    fn match_samples(&mut self, x: f32, round: usize) {
+        if self.settings.samples == 0 {
+            return;
+        }
+        if round.is_multiple_of(REFITS) {
+            self.index = SurfaceIndex::new(&self.positions, &self.sphere.topology.triangles);
+        } else {
+            self.index.refit(&self.positions);
+        }
+        let search = at(self.settings.normal_search, x);
+        let (scan, index, first) = (self.scan, &self.index, round * self.settings.samples);
+        self.sample_matches.par_iter_mut().enumerate().with_min_len(128).for_each(|(i, matched)| {
+            let sample = scan.sample(first + i);
+            let hit = index.closest_oriented(
+                sample.point,
+                sample.normal,
+                search * search,
+                // Samples see more than vertices do: into folds that the template has yet to enter.
+                -0.3,
+                f32::INFINITY,
+                None,
+            );
+            *matched = hit.map_or(SampleMatch::default(), |hit| SampleMatch {
+                triangle: hit.triangle,
+                weight: 1.0,
+                weights: hit.weights,
+                point: sample.point,
+                normal: sample.normal,
+            });
+        });
+    }
+
+    /// E = D_c + D_n in both directions + w_u E_a + w_k E_a + foldover + landmarks.
+    fn add_energies(&mut self, x: f32) -> f64 {
+        let topology = &self.sphere.topology;
+        let settings = self.settings;
+        self.gradient.clear(topology);
+        let gradient = &mut self.gradient;
+        let shape = Shape { topology, positions: &self.positions, normals: &self.normals };
+        let normal = at(settings.normal_weight, x);
+        let floor = 0.2 * self.normals.mean_area_vector();
+        let vertices = &self.vertex_matches;
+        let mut energy = TemplateToScan { matches: vertices, pull: Pull::Distance }.add(shape, 1.0, gradient);
+        energy += f64::from(normal) * VertexNormals { matches: vertices }.add(shape, normal, gradient);
+        if settings.samples > 0 {
+            let samples = &self.sample_matches;
+            energy += ScanToTemplate { matches: samples, pull: Pull::Distance }.add(shape, 1.0, gradient);
+            energy +=
+                f64::from(normal) * SampleNormals { matches: samples, floor }.add(shape, normal, gradient);
+        }
+        let (uniform, adaptive) = density_weights(settings.density, x);
+        if uniform > 0.0 || adaptive > 0.0 {
+            let lengths = mean_edge_lengths(topology, shape.positions);
+            let desired = match &self.curvature {
+                Some(curvature) if adaptive > 0.0 => {
+                    curvature.lengths(topology, shape.positions, &lengths, &mut self.buffer)
+                }
+                _ => uniform_lengths(&lengths),
+            };
+            let weight = uniform.max(adaptive);
+            let adaptation = Adaptation { lengths: &lengths, desired: &desired };
+            energy += f64::from(weight) * adaptation.add(shape, weight, gradient);
+        }
+        let foldover = at(settings.foldover, x);
+        if foldover > 0.0 {
+            energy += f64::from(foldover) * Foldover { cosine: 0.0, floor }.add(shape, foldover, gradient);
+        }
+        if !self.landmarks.is_empty() {
+            let weight = at(settings.landmark_weight, x);
+            energy += f64::from(weight) * Landmarks { pulls: &self.landmarks }.add(shape, weight, gradient);
+        }
+        energy
+    }
+}
+
+/// w_u and w_k at a share x of the iterations; never both.
+fn density_weights(density: Density, x: f32) -> (f32, f32) {
+    match density {
+        Density::Off => (0.0, 0.0),
+        Density::Scheduled { strength } if x < 0.25 => (strength, 0.0),
+        Density::Scheduled { strength } if x < 0.5 => (0.0, 2.0 * strength),
+        Density::Scheduled { .. } => (0.0, 0.0),
+        Density::Fading { uniform } => (uniform * (1.0 - x), 0.0),
+    }
 }

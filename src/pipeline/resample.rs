@@ -2,82 +2,66 @@
 
 use glam::{DVec3, Vec3A};
 
-use crate::mesh::{SurfacePoint, TriangleId};
+use super::sphere::Sphere;
 use crate::numeric::weighted_rotation;
 use crate::spatial::SurfaceIndex;
 
-/// The landmarks of one fitted scan, carried to the sphere: a position on it for each landmark that the scan has.
-pub fn landmarks_on_sphere(
-    sphere: &[DVec3],
-    triangles: &[[u32; 3]],
-    fitted: &[Vec3A],
-    landmarks: &[Option<Vec3A>],
-) -> Vec<Option<DVec3>> {
+/// The landmarks of one fitted scan carried to the unit sphere `[B, 3]`: the closest point of the fit to each.
+pub fn landmarks_on_sphere(sphere: &Sphere, fitted: &[Vec3A], landmarks: &[Vec3A]) -> Vec<DVec3> {
+    let triangles = &sphere.topology.triangles;
     let index = SurfaceIndex::new(fitted, triangles);
-    let carry = |point: Vec3A| {
-        let hit = index.closest(point);
+    let carry = |point: &Vec3A| {
+        let hit = index.closest(*point);
         let corners = triangles[hit.triangle as usize];
-        let on_sphere: DVec3 =
-            corners.iter().zip(hit.weights).map(|(&i, w)| sphere[i as usize] * f64::from(w)).sum();
-        on_sphere.normalize_or_zero()
+        let on_sphere: Vec3A =
+            corners.iter().zip(hit.weights).map(|(&i, w)| sphere.rest[i as usize] * w).sum();
+        on_sphere.as_dvec3().normalize_or(DVec3::Z)
     };
-    landmarks.iter().map(|landmark| landmark.map(carry)).collect()
+    landmarks.iter().map(carry).collect()
 }
 
-/// The mean of the members' sphere landmarks after rotating each by weighted Kabsch onto the first, back on the sphere.
-pub fn average(members: &[Vec<Option<DVec3>>], weights: &[f64], power: f64) -> Vec<Option<DVec3>> {
+/// The mean of the members' sphere landmarks `[M][B, 3]`, each turned by a weighted Kabsch rotation onto the first
+/// member's, back on the sphere.
+pub fn average(members: &[Vec<DVec3>], weights: &[f64]) -> Vec<DVec3> {
     let Some(first) = members.first() else { return Vec::new() };
-    let mut aligned = Vec::new();
+    let mut sums = vec![DVec3::ZERO; weights.len()];
     for member in members {
-        let (mut a, mut b, mut w) = (Vec::new(), Vec::new(), Vec::new());
-        for ((own, reference), &weight) in member.iter().zip(first).zip(weights) {
-            if let (Some(own), Some(reference)) = (own, reference) {
-                a.push(*own);
-                b.push(*reference);
-                w.push(weight);
-            }
+        let rotation = weighted_rotation(member, first, weights);
+        for (sum, own) in sums.iter_mut().zip(member) {
+            *sum += rotation * *own;
         }
-        let rotation = weighted_rotation(&a, &b, &w);
-        aligned.push(member.iter().map(|p| p.map(|p| rotation * p)).collect::<Vec<_>>());
     }
-    let mean = weighted(&aligned, |_, _| 1.0);
-    let near: Vec<Vec<usize>> = (0..weights.len()).map(|b| nearest(&mean, b, 6)).collect();
-    weighted(&aligned, |m, b| room(&aligned[m], b, &near[b]).powf(power))
+    sums.into_iter().zip(first).map(|(sum, first)| sum.normalize_or(*first)).collect()
 }
 
-fn nearest(points: &[Option<DVec3>], b: usize, count: usize) -> Vec<usize> {
-    let Some(p) = points[b] else { return Vec::new() };
-    let mut others: Vec<(f64, usize)> = points.iter().enumerate().filter(|(k, _)| *k != b).filter_map(|(k, q)| q.map(|q| (q.distance(p), k))).collect();
-    others.sort_by(|a, b| a.0.total_cmp(&b.0));
-    others.into_iter().take(count).map(|(_, k)| k).collect()
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::numeric::Random;
+    use glam::DMat3;
 
-fn room(member: &[Option<DVec3>], b: usize, near: &[usize]) -> f64 {
-    let Some(p) = member[b] else { return 0.0 };
-    let d: Vec<f64> = near.iter().filter_map(|&k| member[k].map(|q| q.distance(p))).collect();
-    d.iter().sum::<f64>() / d.len().max(1) as f64
-}
+    #[test]
+    fn turned_members_average_to_the_first() {
+        let mut random = Random::new(5);
+        let mut direction = || DVec3::new(random.signed(), random.signed(), random.signed()).normalize();
+        let first: Vec<DVec3> = (0..12).map(|_| direction()).collect();
+        let turned = |angle: f64| {
+            let rotation = DMat3::from_axis_angle(DVec3::new(0.0, 0.6, 0.8), angle);
+            first.iter().map(|p| rotation * *p).collect::<Vec<_>>()
+        };
+        let members = [first.clone(), turned(0.5), turned(-1.0)];
+        let mut weights = vec![1.0; 12];
+        weights[3] = 1e4;
+        for (mean, first) in average(&members, &weights).iter().zip(&first) {
+            assert!(mean.distance(*first) < 1e-9);
+        }
+    }
 
-fn weighted(members: &[Vec<Option<DVec3>>], weight: impl Fn(usize, usize) -> f64) -> Vec<Option<DVec3>> {
-    (0..members[0].len())
-        .map(|b| {
-            let sum: DVec3 = members.iter().enumerate().filter_map(|(m, member)| member[b].map(|p| p * weight(m, b))).sum();
-            (sum != DVec3::ZERO).then(|| sum.normalize())
-        })
-        .collect()
-}
-
-/// The sphere's surface points nearest to positions on it.
-pub fn on_template(sphere: &[DVec3], triangles: &[[u32; 3]], points: &[Option<DVec3>]) -> Vec<Option<SurfacePoint>> {
-    let positions: Vec<Vec3A> = sphere.iter().map(|p| p.as_vec3a()).collect();
-    let index = SurfaceIndex::new(&positions, triangles);
-    points
-        .iter()
-        .map(|point| {
-            point.map(|point| {
-                let hit = index.closest(point.as_vec3a());
-                SurfacePoint { triangle: TriangleId(hit.triangle), weights: hit.weights.map(f64::from) }
-            })
-        })
-        .collect()
+    #[test]
+    fn a_fit_that_is_the_sphere_carries_landmarks_radially() {
+        let sphere = Sphere::of_level(3);
+        let point = Vec3A::new(0.3, -0.4, 0.8).normalize();
+        let carried = landmarks_on_sphere(&sphere, &sphere.rest, &[point * 1.2]);
+        assert!(carried[0].distance(point.as_dvec3()) < 1e-2);
+    }
 }

@@ -1,7 +1,6 @@
 use glam::{DVec3, Vec3A};
-use rayon::prelude::*;
 
-use crate::mesh::{Topology, TriangleMesh};
+use crate::mesh::{Normals, Topology, TriangleMesh};
 use crate::numeric::Random;
 use crate::spatial::{Hit, SurfaceIndex};
 
@@ -40,7 +39,7 @@ impl ScanSurface {
         let positions: Vec<Vec3A> =
             mesh.positions().iter().map(|p| ((*p - centre) / radius).as_vec3a()).collect();
         let topology = Topology::of(mesh);
-        let normals = crate::mesh::Normals::new(&topology, &positions);
+        let normals = Normals::new(&topology, &positions);
         let samples = sample(mesh.triangles(), &positions, &normals, samples);
         Self {
             centre,
@@ -63,18 +62,29 @@ impl ScanSurface {
         point.as_dvec3() * self.radius + self.centre
     }
 
+    /// Sample number `k`, counted round.
+    pub fn sample(&self, k: usize) -> SurfaceSample {
+        self.samples[k % self.samples.len()]
+    }
+
     /// The scan's smooth unit normal at a point of it.
     pub fn normal_at(&self, hit: &Hit) -> Vec3A {
         let corners = self.index.triangles()[hit.triangle as usize];
-        corners.iter().zip(hit.weights).map(|(&i, w)| self.normals[i as usize] * w).sum::<Vec3A>().normalize_or_zero()
+        corners
+            .iter()
+            .zip(hit.weights)
+            .map(|(&i, w)| self.normals[i as usize] * w)
+            .sum::<Vec3A>()
+            .normalize_or_zero()
     }
 
     /// Whether a point of the scan lies on its rim: there the data ends.
     pub fn on_rim(&self, hit: &Hit) -> bool {
         let t = hit.triangle as usize;
         let on_side = (0..3).any(|k| hit.weights[k] <= 1e-6 && self.rim_sides[t][k]);
-        let on_vertex =
-            (0..3).any(|k| hit.weights[k] >= 1.0 - 1e-6 && self.rim_vertices[self.index.triangles()[t][k] as usize]);
+        let on_vertex = (0..3).any(|k| {
+            hit.weights[k] >= 1.0 - 1e-6 && self.rim_vertices[self.index.triangles()[t][k] as usize]
+        });
         on_side || on_vertex
     }
 }
@@ -98,7 +108,7 @@ fn rim_sides(topology: &Topology) -> Vec<[bool; 3]> {
 fn sample(
     triangles: &[[u32; 3]],
     positions: &[Vec3A],
-    normals: &crate::mesh::Normals,
+    normals: &Normals,
     count: usize,
 ) -> Vec<SurfaceSample> {
     let mut random = Random::new(1);
@@ -126,9 +136,4 @@ fn sample(
         samples.swap(i, random.below(i + 1));
     }
     samples
-}
-
-/// Applies `f` to every item in parallel, in place, in chunks large enough to be worth a thread.
-pub(super) fn refresh<T: Send, F: Fn(usize, &mut T) + Sync>(items: &mut [T], f: F) {
-    items.par_iter_mut().enumerate().with_min_len(256).for_each(|(i, item)| f(i, item));
 }

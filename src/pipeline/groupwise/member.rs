@@ -1,0 +1,260 @@
+use std::sync::Arc;
+
+use glam::Vec3A;
+use rayon::prelude::*;
+
+use super::RestShape;
+use crate::energy::LandmarkPull;
+use crate::mesh::Normals;
+use crate::numeric::{SolveBuffer, SparseCholesky, SymmetricMatrix};
+use crate::pipeline::observer::{Canceled, Watch};
+use crate::pipeline::{GroupwiseSettings, ScanSurface, SurfaceSample};
+use crate::spatial::{Hit, SurfaceIndex};
+
+/// The system is factored anew after this many iterations; in between it is a good preconditioner.
+const FACTOR_EVERY: usize = 4;
+
+/// Weight that keeps a vertex without data where it is.
+const INERTIA: f64 = 0.1;
+
+/// Matches farther than this pull towards the sample itself; nearer ones more and more only along its normal.
+const FAR: f32 = 0.03;
+
+/// One scan of the collection, and where its registration begins.
+pub struct Member<'a> {
+    /// The scan.
+    pub scan: &'a ScanSurface,
+    /// Its landmarks and where they lie on the rest shape.
+    pub landmarks: &'a [LandmarkPull],
+    /// The rest shape in the scan's unit space `[N, 3]`.
+    pub start: Vec<Vec3A>,
+}
+
+/// Deforms the rest shape to a member, stiff to soft; returns positions `[N, 3]` in the scan's unit space.
+///
+/// # Errors
+/// [`Canceled`] if the observer asked to stop.
+pub fn register_member(
+    rest: &RestShape,
+    member: Member,
+    settings: &GroupwiseSettings,
+    watch: &Watch,
+    first_iteration: usize,
+) -> Result<Vec<Vec3A>, Canceled> {
+    let mut registration = Registration::new(rest, member, settings);
+    for phase in 0..settings.phases {
+        registration.enter(phase);
+        for iteration in 0..settings.iterations {
+            let distance = registration.step(iteration);
+            watch.step(first_iteration + phase * settings.iterations + iteration + 1, distance)?;
+        }
+    }
+    Ok(registration.p)
+}
+
+/// A parameter that changes by the same factor from phase to phase.
+fn geometric(range: [f64; 2], x: f64) -> f64 {
+    range[0] * (range[1] / range[0]).powf(x)
+}
+
+struct Registration<'a> {
+    rest: &'a RestShape,
+    scan: &'a ScanSurface,
+    landmarks: &'a [LandmarkPull],
+    settings: &'a GroupwiseSettings,
+    phase: Phase,
+    smoother: Option<Arc<SparseCholesky>>,
+    system: Option<SparseCholesky>,
+    p: Vec<Vec3A>,
+    normals: Normals,
+    index: SurfaceIndex,
+    hints: Vec<u32>,
+    samples_taken: usize,
+    buffer: SolveBuffer,
+}
+
+/// The parameters of a phase.
+#[derive(Debug, Clone, Copy, Default)]
+struct Phase {
+    stiffness: f64,
+    landmark_weight: f64,
+    normal_search: f32,
+    reach: f32,
+}
+
+impl<'a> Registration<'a> {
+    fn new(rest: &'a RestShape, member: Member<'a>, settings: &'a GroupwiseSettings) -> Self {
+        let topology = &rest.sphere.topology;
+        Self {
+            rest,
+            scan: member.scan,
+            landmarks: member.landmarks,
+            settings,
+            phase: Phase::default(),
+            smoother: None,
+            system: None,
+            normals: Normals::new(topology, &member.start),
+            index: SurfaceIndex::new(&member.start, &topology.triangles),
+            hints: vec![0; member.start.len()],
+            p: member.start,
+            samples_taken: 0,
+            buffer: SolveBuffer::default(),
+        }
+    }
+
+    fn enter(&mut self, phase: usize) {
+        let settings = self.settings;
+        let x = phase as f64 / (settings.phases - 1).max(1) as f64;
+        let ramp = |ramp: [f32; 2]| geometric(ramp.map(f64::from), x) as f32;
+        let stiffness = geometric(settings.stiffness, x);
+        self.phase = Phase {
+            stiffness,
+            // As firm as the shape is stiff, so that landmarks lead from the beginning.
+            landmark_weight: settings.landmark_weight * stiffness.max(1.0),
+            normal_search: ramp(settings.normal_search),
+            reach: ramp(settings.reach),
+        };
+        self.smoother = Some(self.rest.sphere.diffusion(geometric(settings.smoothing, x)));
+        if phase > 0 {
+            self.index = SurfaceIndex::new(&self.p, &self.rest.sphere.topology.triangles);
+        }
+    }
+
+    /// One step of Gauss and Newton with a lagging matrix; returns the mean distance of the matches.
+    fn step(&mut self, iteration: usize) -> f64 {
+        let sphere = &self.rest.sphere;
+        self.normals.update(&sphere.topology, &self.p);
+        self.index.refit(&self.p);
+        let vertices = self.match_vertices();
+        let samples = self.match_samples();
+        let mut force = vec![Vec3A::ZERO; self.p.len()];
+        let distance =
+            self.add_vertex_forces(&vertices, &mut force) + self.add_sample_forces(&samples, &mut force);
+        self.add_landmark_forces(&mut force);
+        if let Some(smoother) = &self.smoother {
+            let gradients = self.rest.gradients(&self.p, smoother, &mut self.buffer);
+            self.rest.add_force(&self.p, &gradients, self.phase.stiffness as f32, &mut force);
+        }
+        if iteration.is_multiple_of(FACTOR_EVERY) {
+            self.system = self.factor(&vertices, &samples).or(self.system.take());
+        }
+        if let Some(system) = &self.system {
+            system.solve(&mut force, &mut self.buffer);
+            self.p.iter_mut().zip(&force).for_each(|(p, step)| *p += *step);
+        }
+        distance
+    }
+
+    fn match_vertices(&mut self) -> Vec<Option<Hit>> {
+        let (p, normals, scan) = (&self.p, &self.normals.vertices, self.scan);
+        let (search, reach) = (self.phase.normal_search, self.phase.reach);
+        let least_cosine = self.settings.least_cosine;
+        let closest = |(i, hint): (usize, &mut u32)| {
+            let bound = reach * reach;
+            let hit = scan.index.closest_oriented(
+                p[i],
+                normals[i],
+                search * search,
+                least_cosine,
+                bound,
+                Some(*hint),
+            )?;
+            *hint = hit.triangle;
+            (!scan.on_rim(&hit)).then_some(hit)
+        };
+        self.hints.par_iter_mut().enumerate().with_min_len(128).map(closest).collect()
+    }
+
+    fn match_samples(&mut self) -> Vec<(SurfaceSample, Option<Hit>)> {
+        let (scan, index, settings) = (self.scan, &self.index, self.settings);
+        let (search, first) = (self.phase.normal_search, self.samples_taken);
+        let closest = |k: usize| {
+            let sample = scan.sample(first + k);
+            let hit = index.closest_oriented(
+                sample.point,
+                sample.normal,
+                search * search,
+                settings.sample_least_cosine,
+                settings.sample_reach * settings.sample_reach,
+                None,
+            );
+            (sample, hit)
+        };
+        self.samples_taken += settings.samples;
+        (0..settings.samples).into_par_iter().with_min_len(128).map(closest).collect()
+    }
+
+    /// Pull of each matched vertex to its closest point, mostly along the scan's normal.
+    fn add_vertex_forces(&self, matches: &[Option<Hit>], force: &mut [Vec3A]) -> f64 {
+        let mut sum = 0.0;
+        for (i, hit) in matches.iter().enumerate() {
+            if let Some(hit) = hit {
+                let difference = hit.point - self.p[i];
+                sum += f64::from(difference.length());
+                force[i] += along(difference, self.scan.normal_at(hit), self.settings.plane);
+            }
+        }
+        sum / matches.len() as f64
+    }
+
+    /// One sample weighs as many vertices as there are to a sample.
+    fn sample_weight(&self) -> f32 {
+        self.p.len() as f32 / self.settings.samples.max(1) as f32
+    }
+
+    fn add_sample_forces(&self, matches: &[(SurfaceSample, Option<Hit>)], force: &mut [Vec3A]) -> f64 {
+        let weight = self.sample_weight();
+        let mut sum = 0.0;
+        for (sample, hit) in matches {
+            if let Some(hit) = hit {
+                let difference = sample.point - hit.point;
+                let distance = difference.length();
+                sum += f64::from(distance);
+                let plane = self.settings.plane * (1.0 - (distance / FAR).min(1.0));
+                let pull = along(difference, sample.normal, plane) * weight;
+                let corners = self.rest.sphere.topology.triangles[hit.triangle as usize];
+                for (&i, w) in corners.iter().zip(hit.weights) {
+                    force[i as usize] += pull * w;
+                }
+            }
+        }
+        sum / matches.len().max(1) as f64
+    }
+
+    fn add_landmark_forces(&self, force: &mut [Vec3A]) {
+        for landmark in self.landmarks {
+            let corners = self.rest.sphere.topology.triangles[landmark.triangle as usize];
+            let now: Vec3A = corners.iter().zip(landmark.weights).map(|(&i, w)| self.p[i as usize] * w).sum();
+            let pull = (landmark.target - now) * (self.phase.landmark_weight as f32 * landmark.weight);
+            for (&i, w) in corners.iter().zip(landmark.weights) {
+                force[i as usize] += pull * w;
+            }
+        }
+    }
+
+    /// The half Hessian of everything but the planes' freedom, which it bounds from above.
+    fn factor(
+        &self,
+        vertices: &[Option<Hit>],
+        samples: &[(SurfaceSample, Option<Hit>)],
+    ) -> Option<SparseCholesky> {
+        let sphere = &self.rest.sphere;
+        let diagonal = vertices.iter().map(|hit| INERTIA + f64::from(u8::from(hit.is_some()))).collect();
+        let mut matrix = SymmetricMatrix { diagonal, edges: vec![0.0; sphere.topology.edges.len()] };
+        let weight = f64::from(self.sample_weight());
+        for hit in samples.iter().filter_map(|(_, hit)| hit.as_ref()) {
+            sphere.add_point(&mut matrix, hit.triangle, hit.weights, weight);
+        }
+        for landmark in self.landmarks {
+            let weight = self.phase.landmark_weight * f64::from(landmark.weight);
+            sphere.add_point(&mut matrix, landmark.triangle, landmark.weights, weight);
+        }
+        self.rest.add_stiffness(self.phase.stiffness, &mut matrix);
+        SparseCholesky::new(&sphere.topology, &matrix, sphere.dissection()).ok()
+    }
+}
+
+/// A difference with this share of its part across the normal left out.
+fn along(difference: Vec3A, normal: Vec3A, plane: f32) -> Vec3A {
+    normal * normal.dot(difference) * plane + difference * (1.0 - plane)
+}

@@ -1,0 +1,14 @@
+//! The stage of ours: the mean of the registered set is the shape from which every member is registered again, so that
+//! what lies between landmarks corresponds too.
+//!
+//! E(p) = sum_i |n^.(p_i - q_i)|^2 + sum_s |x_s - B_s p|^2 + w_l sum_b |c_b - k_b|^2 + mu E_J(p), where E_J holds the
+//! edges to the mean's, turned and stretched by deformation gradients J that vary smoothly over the surface: any smooth
+//! deformation costs nothing, whatever its size.
+
+mod mean;
+mod member;
+mod rest_shape;
+
+pub use mean::mean_shape;
+pub use member::{Member, register_member};
+pub use rest_shape::RestShape;

@@ -1,0 +1,122 @@
+use super::settings::{
+    Density, FitSettings, GroupwiseSettings, LevelSettings, Preset, ResampleSettings, SettingError, Settings,
+};
+use crate::mesh::Icosphere;
+
+/// The coarsest sphere a fit begins with: 642 vertices.
+const COARSEST: u32 = 3;
+
+impl Settings {
+    /// The parameters of a preset for a template of `vertices` vertices.
+    ///
+    /// # Errors
+    /// [`SettingError::Vertices`] unless there is such a sphere.
+    pub fn preset(preset: Preset, vertices: usize) -> Result<Self, SettingError> {
+        let level = match Icosphere::level_of(vertices) {
+            Some(level @ COARSEST..=6) => level,
+            _ => return Err(SettingError::Vertices(vertices)),
+        };
+        let resample =
+            ResampleSettings { nose_tip_weight: 1e4, weights: std::collections::BTreeMap::default() };
+        Ok(match preset {
+            Preset::Paper => Self {
+                preset,
+                vertices,
+                fit: paper(level),
+                resample,
+                register: paper(level),
+                groupwise: GroupwiseSettings { rounds: 0, ..groupwise() },
+            },
+            Preset::Default => Self {
+                preset,
+                vertices,
+                fit: coarse_to_fine(level.min(4)),
+                resample,
+                register: coarse_to_fine(level),
+                groupwise: groupwise(),
+            },
+        })
+    }
+
+    /// The parameters of `fit` alone, which goes up to the last level.
+    ///
+    /// # Errors
+    /// As [`Settings::preset`].
+    pub fn for_fit(preset: Preset, vertices: usize) -> Result<Self, SettingError> {
+        let settings = Self::preset(preset, vertices)?;
+        Ok(Self { fit: settings.register.clone(), ..settings })
+    }
+
+    /// The same without density adaptation: diffusion re-parameterization alone.
+    pub fn without_density(mut self) -> Self {
+        for level in self.fit.levels.iter_mut().chain(&mut self.register.levels) {
+            level.density = Density::Off;
+        }
+        self
+    }
+}
+
+/// Section 5.1 and the supplement: one level, fixed weights, no decay of the step.
+fn paper(level: u32) -> FitSettings {
+    FitSettings {
+        start_radius: 1.0,
+        levels: vec![LevelSettings {
+            level,
+            iterations: 1400,
+            lambda: 19.0,
+            rate: 1e-2,
+            rate_end: 1.0,
+            refresh: 1,
+            samples: 0,
+            normal_weight: [1.0, 1.0],
+            normal_search: [0.0, 0.0],
+            least_cosine: -1.0,
+            density: Density::Scheduled { strength: 1.5 },
+            foldover: [0.0, 0.0],
+            landmark_weight: [1.0, 1.0],
+        }],
+    }
+}
+
+fn coarse_to_fine(finest: u32) -> FitSettings {
+    FitSettings { start_radius: 0.9, levels: (COARSEST..=finest).map(level).collect() }
+}
+
+fn level(level: u32) -> LevelSettings {
+    let depth = level - COARSEST;
+    let shrink = 0.6f32.powi(depth as i32);
+    let lambda = [4.0, 6.0, 10.0, 16.0][depth as usize];
+    LevelSettings {
+        level,
+        iterations: if depth < 2 { 200 } else { 250 },
+        lambda,
+        rate: 0.4 * 0.5f32.powi(depth as i32),
+        rate_end: 0.05,
+        refresh: 2,
+        samples: (4 * (10 * 4usize.pow(level) + 2)).min(30_000),
+        normal_weight: [0.06, 0.3],
+        normal_search: [0.15 * shrink, 0.045 * shrink],
+        least_cosine: 0.0,
+        density: Density::Fading { uniform: 3.0 },
+        foldover: [0.0, 0.0],
+        landmark_weight: [10.0, 10.0],
+    }
+}
+
+fn groupwise() -> GroupwiseSettings {
+    GroupwiseSettings {
+        rounds: 2,
+        phases: 9,
+        iterations: 6,
+        stiffness: [1000.0, 0.03],
+        smoothing: [3000.0, 10.0],
+        landmark_weight: 10.0,
+        normal_search: [0.1, 0.02],
+        reach: [0.3, 0.1],
+        least_cosine: 0.2,
+        samples: 30_000,
+        sample_reach: 0.3,
+        sample_least_cosine: 0.2,
+        plane: 0.9,
+    }
+}

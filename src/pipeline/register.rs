@@ -1,0 +1,295 @@
+//! All stages over a collection.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::time::Instant;
+
+use glam::{DVec3, Vec3A};
+use rayon::prelude::*;
+
+use super::fit::{SphereLandmark, fit};
+use super::groupwise::{Member, RestShape, mean_shape, register_member};
+use super::observer::{Canceled, Observer, Stage, Watch};
+use super::resample;
+use super::scan_surface::ScanSurface;
+use super::settings::{FitSettings, Settings};
+use super::sphere::Sphere;
+use crate::energy::LandmarkPull;
+use crate::mesh::{LandmarkSet, SurfacePoint, TriangleMesh};
+use crate::numeric::Similarity;
+use crate::spatial::SurfaceIndex;
+
+/// Samples of a scan that fits draw from.
+const SAMPLES: usize = 120_000;
+
+/// Samples a registration is judged by when the mean is taken.
+const JUDGED: usize = 10_000;
+
+/// One scan to be registered.
+#[derive(Debug, Clone)]
+pub struct Subject {
+    /// Its name, unique in the collection.
+    pub name: String,
+    /// The surface, in its own space.
+    pub mesh: TriangleMesh,
+    /// Its landmarks, in the same space.
+    pub landmarks: LandmarkSet,
+}
+
+/// The template of a registered collection.
+#[derive(Debug, Clone)]
+pub struct Template {
+    /// Vertex positions `[N, 3]` on the unit sphere.
+    pub sphere: Vec<DVec3>,
+    /// The triangles that every result shares `[F, 3]`.
+    pub triangles: Vec<[u32; 3]>,
+    /// Where each landmark lies on it.
+    pub landmarks: BTreeMap<String, SurfacePoint>,
+    /// The mean shape `[N, 3]` of the collection in unit space, after a groupwise stage.
+    pub mean: Option<Vec<Vec3A>>,
+}
+
+/// A registered collection.
+#[derive(Debug, Clone)]
+pub struct Registration {
+    /// What the members share.
+    pub template: Template,
+    /// Vertex positions `[N, 3]` of each member, in its own space, in the order of the subjects.
+    pub members: Vec<Vec<DVec3>>,
+    /// Wall-clock seconds of each stage.
+    pub seconds: BTreeMap<Stage, f64>,
+}
+
+/// Why a collection cannot be registered.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum RegisterError {
+    /// No scan.
+    #[error("there is no scan to register")]
+    Empty,
+    /// Too few landmarks in common.
+    #[error(
+        "only {found} landmarks are known on every scan ({names}); at least {LEAST_LANDMARKS} are needed: \
+         give the scans landmarks of the same scheme"
+    )]
+    TooFewLandmarks {
+        /// How many.
+        found: usize,
+        /// Which.
+        names: String,
+    },
+    /// Stopped on request.
+    #[error(transparent)]
+    Canceled(#[from] Canceled),
+}
+
+/// Fewer common landmarks than these do not fix a rotation of the sphere.
+pub const LEAST_LANDMARKS: usize = 3;
+
+/// Fits the sphere to one scan, stage 1 alone; returns positions `[N, 3]` in the scan's space.
+///
+/// # Errors
+/// [`Canceled`] if the observer asked to stop.
+pub fn fit_scan(
+    name: &str,
+    mesh: &TriangleMesh,
+    settings: &FitSettings,
+    observer: &dyn Observer,
+) -> Result<Vec<DVec3>, Canceled> {
+    let scan = ScanSurface::new(mesh, SAMPLES);
+    let iterations = settings.levels.iter().map(|level| level.iterations).sum();
+    let watch = Watch { observer, stage: Stage::Fit, scan: name, iterations };
+    let positions = fit(&scan, settings, &[], &watch)?;
+    Ok(positions.into_iter().map(|p| scan.to_scan(p)).collect())
+}
+
+/// Registers a collection: fit, resample, register, and rounds of the groupwise stage.
+///
+/// # Errors
+/// [`RegisterError`] for an empty collection, too few common landmarks, or a request to stop.
+pub fn register(
+    subjects: &[Subject],
+    settings: &Settings,
+    observer: &dyn Observer,
+) -> Result<Registration, RegisterError> {
+    let names = common_landmarks(subjects)?;
+    let mut run = Run { settings, observer, names, seconds: BTreeMap::new() };
+    let members = run.timed(Stage::Prepare, |run| run.prepare(subjects));
+    let fits = run.timed(Stage::Fit, |run| run.fit_all(Stage::Fit, &members, &run.settings.fit, &[]))?;
+    let on_sphere = run.timed(Stage::Resample, |run| run.resample(&members, &fits));
+    let mut shapes = run.timed(Stage::Register, |run| {
+        run.fit_all(Stage::Register, &members, &run.settings.register, &on_sphere)
+    })?;
+    let sphere = Sphere::of_level(last_level(&settings.register));
+    let points = sphere.surface_points(on_sphere.iter().copied());
+    let mut mean = None;
+    if settings.groupwise.rounds > 0 {
+        let (refined, shape) =
+            run.timed(Stage::Groupwise, |run| run.groupwise(&sphere, &members, &points, shapes))?;
+        (shapes, mean) = (refined, Some(shape));
+    }
+    let back =
+        |(member, shape): (&Prepared, &Vec<Vec3A>)| shape.iter().map(|p| member.scan.to_scan(*p)).collect();
+    Ok(Registration {
+        template: Template {
+            sphere: sphere.rest.iter().map(|p| p.as_dvec3()).collect(),
+            triangles: sphere.topology.triangles.clone(),
+            landmarks: run.names.iter().cloned().zip(points).collect(),
+            mean,
+        },
+        members: members.iter().zip(&shapes).map(back).collect(),
+        seconds: run.seconds,
+    })
+}
+
+/// The landmarks that every scan has, in the first one's order.
+fn common_landmarks(subjects: &[Subject]) -> Result<Vec<String>, RegisterError> {
+    let first = subjects.first().ok_or(RegisterError::Empty)?;
+    let everywhere = |name: &str| subjects.iter().all(|s| s.landmarks.get(name).is_some());
+    let names: Vec<String> =
+        first.landmarks.present().map(|(name, _)| name.to_owned()).filter(|name| everywhere(name)).collect();
+    if names.len() < LEAST_LANDMARKS {
+        return Err(RegisterError::TooFewLandmarks { found: names.len(), names: names.join(", ") });
+    }
+    Ok(names)
+}
+
+fn last_level(settings: &FitSettings) -> u32 {
+    settings.levels.last().map_or(0, |level| level.level)
+}
+
+/// A scan in unit space, turned as the collection's first one, with its landmarks.
+struct Prepared<'a> {
+    name: &'a str,
+    scan: ScanSurface,
+    landmarks: Vec<Vec3A>,
+}
+
+struct Run<'a> {
+    settings: &'a Settings,
+    observer: &'a dyn Observer,
+    /// The landmarks in use.
+    names: Vec<String>,
+    seconds: BTreeMap<Stage, f64>,
+}
+
+impl Run<'_> {
+    fn timed<T>(&mut self, stage: Stage, work: impl FnOnce(&Self) -> T) -> T {
+        let start = Instant::now();
+        let result = work(self);
+        self.seconds.insert(stage, start.elapsed().as_secs_f64());
+        result
+    }
+
+    fn prepare<'s>(&self, subjects: &'s [Subject]) -> Vec<Prepared<'s>> {
+        let prepare = |subject: &'s Subject| {
+            let scan = ScanSurface::new(&subject.mesh, SAMPLES);
+            let landmarks = self.names.iter().filter_map(|name| subject.landmarks.get(name));
+            let landmarks = landmarks.map(|p| scan.to_unit(p)).collect();
+            Prepared { name: &subject.name, scan, landmarks }
+        };
+        subjects.par_iter().map(prepare).collect()
+    }
+
+    fn fit_all(
+        &self,
+        stage: Stage,
+        members: &[Prepared],
+        settings: &FitSettings,
+        on_sphere: &[DVec3],
+    ) -> Result<Vec<Vec<Vec3A>>, Canceled> {
+        let iterations = settings.levels.iter().map(|level| level.iterations).sum();
+        let one = |member: &Prepared| {
+            let landmarks: Vec<SphereLandmark> = on_sphere
+                .iter()
+                .zip(&member.landmarks)
+                .map(|(&on_sphere, &target)| SphereLandmark { on_sphere, target })
+                .collect();
+            let watch = Watch { observer: self.observer, stage, scan: member.name, iterations };
+            fit(&member.scan, settings, &landmarks, &watch)
+        };
+        members.par_iter().map(one).collect()
+    }
+
+    /// Where the landmarks lie on the sphere, averaged over the members.
+    fn resample(&self, members: &[Prepared], fits: &[Vec<Vec3A>]) -> Vec<DVec3> {
+        let sphere = Sphere::of_level(last_level(&self.settings.fit));
+        let carried: Vec<Vec<DVec3>> = members
+            .par_iter()
+            .zip(fits)
+            .map(|(member, fitted)| resample::landmarks_on_sphere(&sphere, fitted, &member.landmarks))
+            .collect();
+        resample::average(&carried, &self.landmark_weights())
+    }
+
+    fn landmark_weights(&self) -> Vec<f64> {
+        let settings = &self.settings.resample;
+        let nose_tips = ["30", "nose_tip", "nose tip", "pronasale"];
+        let weight = |name: &String| match settings.weights.get(name) {
+            Some(&weight) => weight,
+            None if nose_tips.contains(&name.as_str()) => settings.nose_tip_weight,
+            None => 1.0,
+        };
+        self.names.iter().map(weight).collect()
+    }
+
+    /// Rounds of taking the mean and registering it to every member; returns the shapes and the last mean.
+    fn groupwise(
+        &self,
+        sphere: &Arc<Sphere>,
+        members: &[Prepared],
+        points: &[SurfacePoint],
+        mut shapes: Vec<Vec<Vec3A>>,
+    ) -> Result<(Vec<Vec<Vec3A>>, Vec<Vec3A>), Canceled> {
+        let settings = &self.settings.groupwise;
+        let per_round = settings.phases * settings.iterations;
+        let mut mean = Vec::new();
+        for round in 0..settings.rounds {
+            mean = mean_shape(&shapes, &trust(sphere, members, &shapes));
+            let rest = RestShape::new(sphere.clone(), mean.clone());
+            let one = |(member, shape): (&Prepared, &Vec<Vec3A>)| {
+                let watch = Watch {
+                    observer: self.observer,
+                    stage: Stage::Groupwise,
+                    scan: member.name,
+                    iterations: per_round * settings.rounds,
+                };
+                let pulls = pulls(points, &member.landmarks);
+                let start = moved_onto(&rest.positions, shape);
+                let member = Member { scan: &member.scan, landmarks: &pulls, start };
+                register_member(&rest, member, settings, &watch, round * per_round)
+            };
+            shapes = members.par_iter().zip(&shapes).map(one).collect::<Result<_, _>>()?;
+        }
+        Ok((shapes, mean))
+    }
+}
+
+fn pulls(points: &[SurfacePoint], targets: &[Vec3A]) -> Vec<LandmarkPull> {
+    let pull = |(point, &target): (&SurfacePoint, &Vec3A)| LandmarkPull {
+        triangle: point.triangle.0,
+        weights: point.weights.map(|w| w as f32),
+        target,
+        weight: 1.0,
+    };
+    points.iter().zip(targets).map(pull).collect()
+}
+
+/// A shape moved onto another of the same vertices by a similarity.
+fn moved_onto(shape: &[Vec3A], other: &[Vec3A]) -> Vec<Vec3A> {
+    let from: Vec<DVec3> = shape.iter().map(|p| p.as_dvec3()).collect();
+    let to: Vec<DVec3> = other.iter().map(|p| p.as_dvec3()).collect();
+    let similarity = Similarity::between(&from, &to, &vec![1.0; from.len()]);
+    from.iter().map(|p| similarity.apply(*p).as_vec3a()).collect()
+}
+
+/// A weight for each member in the mean: the inverse of its mean squared distance, so that a shape that missed its scan
+/// does not spoil the mean.
+fn trust(sphere: &Sphere, members: &[Prepared], shapes: &[Vec<Vec3A>]) -> Vec<f64> {
+    let one = |(member, shape): (&Prepared, &Vec<Vec3A>)| {
+        let index = SurfaceIndex::new(shape, &sphere.topology.triangles);
+        let sum: f64 =
+            (0..JUDGED).map(|k| f64::from(index.closest(member.scan.sample(k).point).distance_squared)).sum();
+        1.0 / (sum / JUDGED as f64 + 1e-6)
+    };
+    members.par_iter().zip(shapes).map(one).collect()
+}

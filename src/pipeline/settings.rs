@@ -1,0 +1,162 @@
+use serde::{Deserialize, Serialize};
+
+/// A value that moves from one number to another while a level's iterations run.
+pub type Ramp = [f32; 2];
+
+/// A named set of parameters.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Preset {
+    /// Ours: coarse to fine, both data directions, a groupwise stage.
+    Default,
+    /// The paper's: T = 1400, lambda = 19, m = 1.5, template to scan only, its schedule.
+    Paper,
+}
+
+/// Every parameter of the pipeline; what a report says was used.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Settings {
+    /// The preset these started from.
+    pub preset: Preset,
+    /// Template vertices: 10 * 4^k + 2.
+    pub vertices: usize,
+    /// Stage 1 of a registration, without landmarks.
+    pub fit: FitSettings,
+    /// Stage 2.
+    pub resample: ResampleSettings,
+    /// Stage 3, with landmarks.
+    pub register: FitSettings,
+    /// The groupwise stage; zero rounds leave it out.
+    pub groupwise: GroupwiseSettings,
+}
+
+/// A sphere deformed to a scan, coarse to fine.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FitSettings {
+    /// Radius of the sphere at the start; the scan's is one.
+    pub start_radius: f32,
+    /// The levels in order, each a subdivision of the one before.
+    pub levels: Vec<LevelSettings>,
+}
+
+/// One level of a fit.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LevelSettings {
+    /// Subdivisions k of the icosahedron: 10 * 4^k + 2 vertices.
+    pub level: u32,
+    /// Iterations T.
+    pub iterations: usize,
+    /// lambda of u = (I + lambda L) p.
+    pub lambda: f64,
+    /// Step of AdamUniform at the first iteration.
+    pub rate: f32,
+    /// Step at the last iteration, as a share of the first; in between it decays geometrically.
+    pub rate_end: f32,
+    /// Iterations between two searches for closest points.
+    pub refresh: usize,
+    /// Scan samples pulled at the template; zero leaves the direction scan to template out.
+    pub samples: usize,
+    /// Weight of the normal terms.
+    pub normal_weight: Ramp,
+    /// Weight of normals against positions in the search for closest points, a length in unit space.
+    pub normal_search: Ramp,
+    /// Cosine between the normals below which a template vertex takes no point; -1 takes all.
+    pub least_cosine: f32,
+    /// Density adaptation.
+    pub density: Density,
+    /// Weight of the foldover term.
+    pub foldover: Ramp,
+    /// Weight of the landmark term.
+    pub landmark_weight: Ramp,
+}
+
+/// Which adaptation energies act when.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Density {
+    /// None: diffusion re-parameterization alone.
+    Off,
+    /// The paper's schedule: w_u = m in the first quarter, w_k = 2 m in the second, none after.
+    Scheduled {
+        /// Strength m.
+        strength: f32,
+    },
+    /// Uniform with a weight that fades linearly to nothing.
+    Fading {
+        /// w_u at the first iteration.
+        uniform: f32,
+    },
+}
+
+/// How sphere landmarks are averaged.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ResampleSettings {
+    /// Weight of the nose tip in the alignment; every other landmark has weight one.
+    pub nose_tip_weight: f64,
+    /// Weights by landmark name, over the ones above.
+    pub weights: std::collections::BTreeMap<String, f64>,
+}
+
+/// Registration of every scan from the collection's mean.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct GroupwiseSettings {
+    /// How often a mean is taken and registered to every scan.
+    pub rounds: usize,
+    /// Phases of a round, from stiff to soft.
+    pub phases: usize,
+    /// Iterations of a phase.
+    pub iterations: usize,
+    /// Stiffness mu in the first and the last phase.
+    pub stiffness: [f64; 2],
+    /// Diffusion of the deformation gradients in the first and the last phase.
+    pub smoothing: [f64; 2],
+    /// Weight of a landmark against a vertex's data.
+    pub landmark_weight: f64,
+    /// Weight of normals in the search for closest points, in the first and the last phase.
+    pub normal_search: Ramp,
+    /// Largest distance of a template vertex's closest point, in the first and the last phase.
+    pub reach: Ramp,
+    /// Cosine between the normals below which a match is dropped.
+    pub least_cosine: f32,
+    /// Scan samples pulled at the template.
+    pub samples: usize,
+    /// Largest distance of a scan sample's closest template point.
+    pub sample_reach: f32,
+    /// Cosine between the normals below which a sample's match is dropped.
+    pub sample_least_cosine: f32,
+    /// Share of a match's pull along the scan's normal only: 1 lets the template slide freely.
+    pub plane: f32,
+}
+
+/// A parameter that cannot be set.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum SettingError {
+    /// No template of that size.
+    #[error("a template of {0} vertices does not exist; choose 642, 2562, 10242 or 40962")]
+    Vertices(usize),
+    /// No parameter of that name.
+    #[error("there is no parameter {name:?}; at {parent:?} there are: {known}")]
+    Unknown {
+        /// The name asked for.
+        name: String,
+        /// The part of it that exists.
+        parent: String,
+        /// What exists there.
+        known: String,
+    },
+    /// Not a value for that parameter.
+    #[error("parameter {name:?} cannot be {value:?}: {reason}")]
+    Value {
+        /// The parameter.
+        name: String,
+        /// The value given.
+        value: String,
+        /// Why not.
+        reason: String,
+    },
+}
