@@ -8,16 +8,16 @@ use glam::{DVec3, Vec3A};
 use rayon::prelude::*;
 
 use super::fit::{SphereLandmark, fit};
-use super::groupwise::{Member, RestShape, mean_shape, register_member};
+use super::groupwise::{Member, RestShape, mean_shape, redistribute, register_member};
 use super::observer::{Canceled, Observer, Stage, Watch};
 use super::resample;
 use super::scan_surface::ScanSurface;
 use super::settings::{FitSettings, Settings};
 use super::sphere::Sphere;
 use crate::energy::LandmarkPull;
-use crate::mesh::{LandmarkSet, SurfacePoint, TriangleMesh};
+use crate::mesh::{LandmarkSet, SurfacePoint, TriangleId, TriangleMesh};
 use crate::numeric::Similarity;
-use crate::spatial::SurfaceIndex;
+use crate::spatial::{Hit, SurfaceIndex};
 
 /// Samples of a scan that fits draw from.
 const SAMPLES: usize = 120_000;
@@ -120,11 +120,11 @@ pub fn register(
         run.fit_all(Stage::Register, &members, &run.settings.register, &on_sphere)
     })?;
     let sphere = Sphere::of_level(last_level(&settings.register));
-    let points = sphere.surface_points(on_sphere.iter().copied());
+    let mut points = sphere.surface_points(on_sphere.iter().copied());
     let mut mean = None;
     if settings.groupwise.rounds > 0 {
         let (refined, shape) =
-            run.timed(Stage::Groupwise, |run| run.groupwise(&sphere, &members, &points, shapes))?;
+            run.timed(Stage::Groupwise, |run| run.groupwise(&sphere, &members, &mut points, shapes))?;
         (shapes, mean) = (refined, Some(shape));
     }
     let back =
@@ -237,7 +237,7 @@ impl Run<'_> {
         &self,
         sphere: &Arc<Sphere>,
         members: &[Prepared],
-        points: &[SurfacePoint],
+        points: &mut Vec<SurfacePoint>,
         mut shapes: Vec<Vec<Vec3A>>,
     ) -> Result<(Vec<Vec<Vec3A>>, Vec<Vec3A>), Canceled> {
         let settings = &self.settings.groupwise;
@@ -245,6 +245,12 @@ impl Run<'_> {
         let mut mean = Vec::new();
         for round in 0..settings.rounds {
             mean = mean_shape(&shapes, &trust(sphere, members, &shapes));
+            if round > 0 {
+                let moved = redistribute(sphere, &mean, &shapes, settings);
+                *points = relocate(sphere, points, &moved);
+                mean = carried(sphere, &mean, &moved);
+                shapes = shapes.iter().map(|shape| carried(sphere, shape, &moved)).collect();
+            }
             let rest = RestShape::new(sphere.clone(), mean.clone());
             let one = |(member, shape): (&Prepared, &Vec<Vec3A>)| {
                 let watch = Watch {
@@ -262,6 +268,29 @@ impl Run<'_> {
         }
         Ok((shapes, mean))
     }
+}
+
+/// Values on the old sphere `[N, 3]` at the points that its vertices moved to.
+fn carried(sphere: &Sphere, values: &[Vec3A], moved: &[Hit]) -> Vec<Vec3A> {
+    let at = |hit: &Hit| {
+        let corners = sphere.topology.triangles[hit.triangle as usize];
+        corners.iter().zip(hit.weights).map(|(&i, w)| values[i as usize] * w).sum()
+    };
+    moved.iter().map(at).collect()
+}
+
+/// The same points of the sphere on its moved triangles.
+fn relocate(sphere: &Sphere, points: &[SurfacePoint], moved: &[Hit]) -> Vec<SurfacePoint> {
+    let vertices: Vec<Vec3A> = moved.iter().map(|hit| hit.point).collect();
+    let index = SurfaceIndex::new(&vertices, &sphere.topology.triangles);
+    let relocate = |point: &SurfacePoint| {
+        let corners = sphere.topology.triangles[point.triangle.0 as usize];
+        let position: Vec3A =
+            corners.iter().zip(point.weights).map(|(&i, w)| sphere.rest[i as usize] * w as f32).sum();
+        let hit = index.closest(position);
+        SurfacePoint { triangle: TriangleId(hit.triangle), weights: hit.weights.map(f64::from) }
+    };
+    points.iter().map(relocate).collect()
 }
 
 fn pulls(points: &[SurfacePoint], targets: &[Vec3A]) -> Vec<LandmarkPull> {

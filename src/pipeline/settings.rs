@@ -107,6 +107,12 @@ pub struct ResampleSettings {
 pub struct GroupwiseSettings {
     /// How often a mean is taken and registered to every scan.
     pub rounds: usize,
+    /// Exponent of curvature in the vertex density of the shared template; zero leaves it even.
+    pub curvature_power: f32,
+    /// Diffusion of the need for vertices.
+    pub need_smoothing: f64,
+    /// Most vertices a place may draw, relative to the median.
+    pub most_need: f32,
     /// Phases of a round, from stiff to soft.
     pub phases: usize,
     /// Iterations of a phase.
@@ -129,6 +135,10 @@ pub struct GroupwiseSettings {
     pub sample_reach: f32,
     /// Cosine between the normals below which a sample's match is dropped.
     pub sample_least_cosine: f32,
+    /// A template point this far from the scan is free to be pulled by any sample.
+    pub slack: f32,
+    /// Otherwise only by samples whose distance, times this, its own distance exceeds.
+    pub own_share: f32,
     /// Share of a match's pull along the scan's normal only: 1 lets the template slide freely.
     pub plane: f32,
 }

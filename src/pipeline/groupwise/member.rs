@@ -20,6 +20,10 @@ const INERTIA: f64 = 0.1;
 /// Matches farther than this pull towards the sample itself; nearer ones more and more only along its normal.
 const FAR: f32 = 0.03;
 
+/// Share of the phases after which the template enters what far samples show it, an open mouth: by then the rest of it
+/// lies on the scan and no longer follows them.
+const ENTER: f64 = 0.65;
+
 /// One scan of the collection, and where its registration begins.
 pub struct Member<'a> {
     /// The scan.
@@ -65,12 +69,20 @@ struct Registration<'a> {
     phase: Phase,
     smoother: Option<Arc<SparseCholesky>>,
     system: Option<SparseCholesky>,
+    factored_weights: Vec<f32>,
     p: Vec<Vec3A>,
     normals: Normals,
     index: SurfaceIndex,
     hints: Vec<u32>,
     samples_taken: usize,
     buffer: SolveBuffer,
+}
+
+/// A scan sample, the template point it pulls, and how firmly: far samples pull no harder than [`FAR`] away.
+struct SampleHit {
+    sample: SurfaceSample,
+    hit: Hit,
+    weight: f32,
 }
 
 /// The parameters of a phase.
@@ -80,6 +92,8 @@ struct Phase {
     landmark_weight: f64,
     normal_search: f32,
     reach: f32,
+    sample_reach: f32,
+    least_cosine: f32,
 }
 
 impl<'a> Registration<'a> {
@@ -93,6 +107,7 @@ impl<'a> Registration<'a> {
             phase: Phase::default(),
             smoother: None,
             system: None,
+            factored_weights: Vec::new(),
             normals: Normals::new(topology, &member.start),
             index: SurfaceIndex::new(&member.start, &topology.triangles),
             hints: vec![0; member.start.len()],
@@ -107,12 +122,16 @@ impl<'a> Registration<'a> {
         let x = phase as f64 / (settings.phases - 1).max(1) as f64;
         let ramp = |ramp: [f32; 2]| geometric(ramp.map(f64::from), x) as f32;
         let stiffness = geometric(settings.stiffness, x);
+        let entering = x >= ENTER;
         self.phase = Phase {
             stiffness,
             // As firm as the shape is stiff, so that landmarks lead from the beginning.
             landmark_weight: settings.landmark_weight * stiffness.max(1.0),
             normal_search: ramp(settings.normal_search),
-            reach: ramp(settings.reach),
+            reach: if entering { f32::INFINITY } else { ramp(settings.reach) },
+            sample_reach: if entering { settings.sample_reach } else { ramp(settings.reach) },
+            // Once it enters, every vertex is held by the scan, whichever way it looks: none is left to stick out.
+            least_cosine: if entering { -1.0 } else { settings.least_cosine },
         };
         self.smoother = Some(self.rest.sphere.diffusion(geometric(settings.smoothing, x)));
         if phase > 0 {
@@ -126,7 +145,7 @@ impl<'a> Registration<'a> {
         self.normals.update(&sphere.topology, &self.p);
         self.index.refit(&self.p);
         let vertices = self.match_vertices();
-        let samples = self.match_samples();
+        let samples = self.match_samples(&vertices);
         let mut force = vec![Vec3A::ZERO; self.p.len()];
         let distance =
             self.add_vertex_forces(&vertices, &mut force) + self.add_sample_forces(&samples, &mut force);
@@ -135,8 +154,15 @@ impl<'a> Registration<'a> {
             let gradients = self.rest.gradients(&self.p, smoother, &mut self.buffer);
             self.rest.add_force(&self.p, &gradients, self.phase.stiffness as f32, &mut force);
         }
+        let weights = self.data_weights(&vertices, &samples);
         if iteration.is_multiple_of(FACTOR_EVERY) {
             self.system = self.factor(&vertices, &samples).or(self.system.take());
+            self.factored_weights = weights;
+        } else {
+            // Matches that the factored matrix does not know of would overshoot.
+            for ((force, now), factored) in force.iter_mut().zip(weights).zip(&self.factored_weights) {
+                *force *= (factored / now).min(1.0);
+            }
         }
         if let Some(system) = &self.system {
             system.solve(&mut force, &mut self.buffer);
@@ -145,10 +171,23 @@ impl<'a> Registration<'a> {
         distance
     }
 
+    /// How firmly data holds each vertex `[N]`.
+    fn data_weights(&self, vertices: &[Option<Hit>], samples: &[Option<SampleHit>]) -> Vec<f32> {
+        let mut weights: Vec<f32> =
+            vertices.iter().map(|hit| INERTIA as f32 + f32::from(u8::from(hit.is_some()))).collect();
+        for SampleHit { hit, weight, .. } in samples.iter().flatten() {
+            let corners = self.rest.sphere.topology.triangles[hit.triangle as usize];
+            for (&i, w) in corners.iter().zip(hit.weights) {
+                weights[i as usize] += weight * w;
+            }
+        }
+        weights
+    }
+
     fn match_vertices(&mut self) -> Vec<Option<Hit>> {
         let (p, normals, scan) = (&self.p, &self.normals.vertices, self.scan);
         let (search, reach) = (self.phase.normal_search, self.phase.reach);
-        let least_cosine = self.settings.least_cosine;
+        let least_cosine = self.phase.least_cosine;
         let closest = |(i, hint): (usize, &mut u32)| {
             let bound = reach * reach;
             let hit = scan.index.closest_oriented(
@@ -165,9 +204,25 @@ impl<'a> Registration<'a> {
         self.hints.par_iter_mut().enumerate().with_min_len(128).map(closest).collect()
     }
 
-    fn match_samples(&mut self) -> Vec<(SurfaceSample, Option<Hit>)> {
+    fn match_samples(&mut self, vertices: &[Option<Hit>]) -> Vec<Option<SampleHit>> {
         let (scan, index, settings) = (self.scan, &self.index, self.settings);
+        let off: Vec<f32> =
+            vertices.iter().map(|hit| hit.map_or(f32::MAX, |hit| hit.distance_squared)).collect();
+        let triangles = &self.rest.sphere.topology.triangles;
+        let free = |sample: &SurfaceSample, hit: &Hit| {
+            let difference = sample.point - hit.point;
+            let distance = difference.length();
+            // A template point that already lies on the scan is not for far samples to pull: they belong to a part of
+            // the scan that the template has yet to enter elsewhere, as an open mouth.
+            let own =
+                triangles[hit.triangle as usize].iter().map(|&i| off[i as usize]).fold(0.0, f32::max).sqrt();
+            // Nor are two sheets a match that turn their backs on each other, as a cheek and the mouth behind it.
+            let facing =
+                difference.dot(index.triangle_normal(hit.triangle)) * difference.dot(sample.normal) >= 0.0;
+            distance < settings.slack || (facing && own + settings.slack > settings.own_share * distance)
+        };
         let (search, first) = (self.phase.normal_search, self.samples_taken);
+        let (sample_reach, per_sample) = (self.phase.sample_reach, self.sample_weight());
         let closest = |k: usize| {
             let sample = scan.sample(first + k);
             let hit = index.closest_oriented(
@@ -175,10 +230,12 @@ impl<'a> Registration<'a> {
                 sample.normal,
                 search * search,
                 settings.sample_least_cosine,
-                settings.sample_reach * settings.sample_reach,
+                sample_reach * sample_reach,
                 None,
             );
-            (sample, hit)
+            let hit = hit.filter(|hit| free(&sample, hit))?;
+            let weight = (FAR / hit.distance_squared.sqrt().max(FAR)).min(1.0) * per_sample;
+            Some(SampleHit { sample, hit, weight })
         };
         self.samples_taken += settings.samples;
         (0..settings.samples).into_par_iter().with_min_len(128).map(closest).collect()
@@ -202,20 +259,17 @@ impl<'a> Registration<'a> {
         self.p.len() as f32 / self.settings.samples.max(1) as f32
     }
 
-    fn add_sample_forces(&self, matches: &[(SurfaceSample, Option<Hit>)], force: &mut [Vec3A]) -> f64 {
-        let weight = self.sample_weight();
+    fn add_sample_forces(&self, matches: &[Option<SampleHit>], force: &mut [Vec3A]) -> f64 {
         let mut sum = 0.0;
-        for (sample, hit) in matches {
-            if let Some(hit) = hit {
-                let difference = sample.point - hit.point;
-                let distance = difference.length();
-                sum += f64::from(distance);
-                let plane = self.settings.plane * (1.0 - (distance / FAR).min(1.0));
-                let pull = along(difference, sample.normal, plane) * weight;
-                let corners = self.rest.sphere.topology.triangles[hit.triangle as usize];
-                for (&i, w) in corners.iter().zip(hit.weights) {
-                    force[i as usize] += pull * w;
-                }
+        for SampleHit { sample, hit, weight } in matches.iter().flatten() {
+            let difference = sample.point - hit.point;
+            let distance = difference.length();
+            sum += f64::from(distance);
+            let plane = self.settings.plane * (1.0 - (distance / FAR).min(1.0));
+            let pull = along(difference, sample.normal, plane) * *weight;
+            let corners = self.rest.sphere.topology.triangles[hit.triangle as usize];
+            for (&i, w) in corners.iter().zip(hit.weights) {
+                force[i as usize] += pull * w;
             }
         }
         sum / matches.len().max(1) as f64
@@ -233,17 +287,12 @@ impl<'a> Registration<'a> {
     }
 
     /// The half Hessian of everything but the planes' freedom, which it bounds from above.
-    fn factor(
-        &self,
-        vertices: &[Option<Hit>],
-        samples: &[(SurfaceSample, Option<Hit>)],
-    ) -> Option<SparseCholesky> {
+    fn factor(&self, vertices: &[Option<Hit>], samples: &[Option<SampleHit>]) -> Option<SparseCholesky> {
         let sphere = &self.rest.sphere;
         let diagonal = vertices.iter().map(|hit| INERTIA + f64::from(u8::from(hit.is_some()))).collect();
         let mut matrix = SymmetricMatrix { diagonal, edges: vec![0.0; sphere.topology.edges.len()] };
-        let weight = f64::from(self.sample_weight());
-        for hit in samples.iter().filter_map(|(_, hit)| hit.as_ref()) {
-            sphere.add_point(&mut matrix, hit.triangle, hit.weights, weight);
+        for SampleHit { hit, weight, .. } in samples.iter().flatten() {
+            sphere.add_point(&mut matrix, hit.triangle, hit.weights, f64::from(*weight));
         }
         for landmark in self.landmarks {
             let weight = self.phase.landmark_weight * f64::from(landmark.weight);

@@ -7,8 +7,10 @@
 
 mod mean;
 mod member;
+mod redistribution;
 mod rest_shape;
 
 pub use mean::mean_shape;
 pub use member::{Member, register_member};
+pub use redistribution::redistribute;
 pub use rest_shape::RestShape;

@@ -1,0 +1,159 @@
+use glam::Vec3A;
+use rayon::prelude::*;
+
+use crate::mesh::{Normals, Topology};
+use crate::numeric::SolveBuffer;
+use crate::pipeline::{GroupwiseSettings, Sphere};
+use crate::spatial::{Hit, SurfaceIndex};
+
+/// Steps of the flow, and the share of the remaining density error that each removes.
+const STEPS: usize = 80;
+const SHARE: f32 = 0.2;
+const STRIDE: f32 = 0.2;
+
+/// Density adaptation of the shared template: vertices flow over the sphere to where the members need them.
+///
+/// A vertex's need is what its area on a member, relative to the mean, times that member's curvature there asks for:
+/// n_i = max over members of a_mi / a_i * kappa_mi^p. The flow moves vertices along the gradient of psi, with
+/// L psi = log(A_i n_i) - mean, until their areas A on the sphere are inverse to the need. On the sphere nothing is in
+/// the way, so no triangle folds.
+///
+/// Returns the point of the old sphere that each vertex `[N]` moves to.
+pub fn redistribute(
+    sphere: &Sphere,
+    mean: &[Vec3A],
+    members: &[Vec<Vec3A>],
+    settings: &GroupwiseSettings,
+) -> Vec<Hit> {
+    let need = need(sphere, mean, members, settings);
+    let topology = &sphere.topology;
+    let index = SurfaceIndex::new(&sphere.rest, &topology.triangles);
+    let solver = sphere.diffusion(FLOW_LAMBDA);
+    let mut buffer = SolveBuffer::default();
+    let mut x = sphere.rest.clone();
+    for _ in 0..STEPS {
+        let needed =
+            locate(&index, &x).par_iter().map(|hit| interpolate(topology, &need, hit)).collect::<Vec<_>>();
+        let areas = vertex_areas(topology, &x);
+        let mut psi: Vec<f32> = areas.iter().zip(&needed).map(|(a, n)| (a * n).max(1e-20).ln()).collect();
+        let average = psi.iter().sum::<f32>() / psi.len() as f32;
+        psi.iter_mut().for_each(|r| *r = 1.5 * FLOW_LAMBDA as f32 * (*r - average));
+        solver.solve_scalar(&mut psi, &mut buffer);
+        x = flow(topology, &x, &psi);
+        #[cfg(test)]
+        {
+            let e: f32 = areas
+                .iter()
+                .zip(&needed)
+                .map(|(a, n)| (a * n).max(1e-20).ln())
+                .map(|r| (r - average).powi(2))
+                .sum::<f32>()
+                / psi.len() as f32;
+            println!("{e}");
+        }
+    }
+    locate(&index, &x)
+}
+
+/// Diffusion so strong that (I + lambda L) / lambda is the Laplacian but for the constant.
+const FLOW_LAMBDA: f64 = 1e4;
+
+fn locate(index: &SurfaceIndex, x: &[Vec3A]) -> Vec<Hit> {
+    x.par_iter().with_min_len(256).map(|p| index.closest(*p)).collect()
+}
+
+fn interpolate(topology: &Topology, values: &[f32], hit: &Hit) -> f32 {
+    let corners = topology.triangles[hit.triangle as usize];
+    corners.iter().zip(hit.weights).map(|(&i, w)| values[i as usize] * w).sum()
+}
+
+/// One step of the flow along the gradient of psi, kept on the sphere; no vertex moves more than [`STRIDE`] of the
+/// edges around it, and all are held back alike, so that the step stays smooth.
+fn flow(topology: &Topology, x: &[Vec3A], psi: &[f32]) -> Vec<Vec3A> {
+    let step = |i: usize| {
+        let ring = topology.neighbours.row(i);
+        let (mut gradient, mut squared, mut shortest) = (Vec3A::ZERO, 0.0, f32::MAX);
+        for &j in ring {
+            let edge = x[j as usize] - x[i];
+            let length = edge.length_squared().max(1e-12);
+            gradient += edge * ((psi[j as usize] - psi[i]) / length);
+            squared += length;
+            shortest = shortest.min(length);
+        }
+        let count = ring.len().max(1) as f32;
+        // psi was solved with a unit grid spacing; the gradient per true length brings the spacing back in.
+        let step = gradient * (2.0 / count * squared / count);
+        (step, step.length() / shortest.sqrt())
+    };
+    let steps: Vec<(Vec3A, f32)> = (0..x.len()).into_par_iter().with_min_len(512).map(step).collect();
+    let longest = steps.iter().map(|(_, stride)| *stride).fold(0.0, f32::max);
+    let share = SHARE.min(STRIDE / longest.max(f32::MIN_POSITIVE));
+    x.iter().zip(steps).map(|(x, (step, _))| (*x + step * share).normalize()).collect()
+}
+
+fn vertex_areas(topology: &Topology, p: &[Vec3A]) -> Vec<f32> {
+    let normals = Normals::new(topology, p);
+    let area = |i: usize| {
+        topology.fans.row(i).iter().map(|f| normals.area_vectors[f[0] as usize].length()).sum::<f32>()
+    };
+    (0..p.len()).map(|i| area(i) / 6.0).collect()
+}
+
+/// n_i per vertex `[N]`, on the old sphere, smoothed.
+fn need(sphere: &Sphere, mean: &[Vec3A], members: &[Vec<Vec3A>], settings: &GroupwiseSettings) -> Vec<f32> {
+    let topology = &sphere.topology;
+    let mut buffer = SolveBuffer::default();
+    let smoother = sphere.diffusion(settings.need_smoothing);
+    let mut need = vec![0f32; mean.len()];
+    for member in members {
+        let normals = Normals::new(topology, member);
+        let areas = vertex_areas(topology, member);
+        let total: f32 = areas.iter().sum();
+        let mut own: Vec<f32> = (0..member.len())
+            .map(|i| {
+                let ring = topology.neighbours.row(i);
+                let bend = |&j: &u32| {
+                    let edge = member[j as usize] - member[i];
+                    normals.vertices[i].dot(edge).abs() / edge.length_squared().max(1e-12)
+                };
+                let curvature = 2.0 * ring.iter().map(bend).sum::<f32>() / ring.len() as f32;
+                // Areas on the sphere are equal, so the member's area is its stretch.
+                areas[i] / total * curvature.clamp(1.0, 60.0).powf(settings.curvature_power)
+            })
+            .collect();
+        smoother.solve_scalar(&mut own, &mut buffer);
+        need.iter_mut().zip(own).for_each(|(need, own)| *need = need.max(own));
+    }
+    let mut sorted = need.clone();
+    sorted.sort_by(f32::total_cmp);
+    let median = sorted[sorted.len() / 2];
+    need.iter_mut().for_each(|n| *n = (*n / median).clamp(0.2, settings.most_need));
+    need
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn vertices_gather_where_a_member_is_stretched() {
+        let sphere = Sphere::of_level(4);
+        let mut member = sphere.rest.clone();
+        for p in &mut member {
+            // A cap pulled out to a horn.
+            if p.z > 0.9 {
+                p.z += 8.0 * (p.z - 0.9);
+            }
+        }
+        let settings =
+            crate::pipeline::Settings::preset(crate::pipeline::Preset::Default, 2562).unwrap().groupwise;
+        let hits = redistribute(&sphere, &sphere.rest, &[member], &settings);
+        let moved: Vec<Vec3A> = hits.iter().map(|h| h.point).collect();
+        let inside = |p: &[Vec3A]| p.iter().filter(|p| p.z > 0.9).count();
+        assert!(inside(&moved) > 2 * inside(&sphere.rest), "{} {}", inside(&moved), inside(&sphere.rest));
+        let normals = Normals::new(&sphere.topology, &moved);
+        let folded = (0..sphere.topology.triangles.len())
+            .filter(|&t| normals.triangle(t).dot(moved[sphere.topology.triangles[t][0] as usize]) <= 0.0);
+        assert_eq!(folded.count(), 0);
+    }
+}
