@@ -7,7 +7,7 @@ use onemesh::evaluate::{
 use onemesh::mesh::TriangleMesh;
 use onemesh::pipeline::{Preset, Settings, Sphere, Subject, fit_scan, register};
 
-/// How much worse than the golden figure a result may be: rounding differs from processor to processor. Better is well.
+/// How much worse than the golden figure a result may be, since rounding differs from processor to processor.
 const SLACK: f64 = 1.25;
 
 fn heads(count: usize) -> Vec<SculptedHead> {
