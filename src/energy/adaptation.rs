@@ -19,3 +19,20 @@ impl Adaptation<'_> {
         difference().map(|d| f64::from(d * d)).sum::<f64>() / f64::from(n)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::shape::bumpy::gradient_error;
+    use super::*;
+    use crate::mesh::mean_edge_lengths;
+
+    #[test]
+    fn gradient() {
+        let error = gradient_error(|shape, weight, gradient| {
+            let lengths = mean_edge_lengths(shape.topology, shape.positions);
+            let desired: Vec<f32> = (0..lengths.len()).map(|i| 0.2 + 0.02 * (i % 7) as f32).collect();
+            Adaptation { lengths: &lengths, desired: &desired }.add(shape, weight, gradient)
+        });
+        assert!(error < 2e-3, "{error}");
+    }
+}

@@ -103,3 +103,56 @@ impl ScanToTemplate<'_> {
         sum / self.matches.len().max(1) as f64
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::shape::bumpy::{gradient_error, sphere, vector};
+    use super::*;
+    use crate::numeric::Random;
+
+    /// Distances, and Huber's on both sides of its scale.
+    const PULLS: [Pull; 2] = [Pull::Distance, Pull::Huber(0.25)];
+
+    #[test]
+    fn gradient_of_the_template_to_the_scan() {
+        let mut random = Random::new(21);
+        let matches: Vec<VertexMatch> = (sphere().1.iter().enumerate())
+            .map(|(i, &p)| VertexMatch {
+                point: p + (0.1 + 0.4 * random.unit() as f32) * vector(&mut random).normalize(),
+                normal: Vec3A::Z,
+                weight: (i % 4) as f32,
+            })
+            .collect();
+        for pull in PULLS {
+            let error = gradient_error(|shape, weight, gradient| {
+                TemplateToScan { matches: &matches, pull }.add(shape, weight, gradient)
+            });
+            assert!(error < 2e-3, "{pull:?}: {error}");
+        }
+    }
+
+    #[test]
+    fn gradient_of_the_scan_to_the_template() {
+        let (topology, positions) = sphere();
+        let mut random = Random::new(22);
+        let sample = |i: usize| {
+            let triangle = random.below(topology.triangles.len());
+            let near = positions[topology.triangles[triangle][0] as usize];
+            let [a, b] = [random.unit() as f32, random.unit() as f32].map(|w| 0.5 * w);
+            SampleMatch {
+                triangle: triangle as u32,
+                weight: (i % 4) as f32,
+                weights: [1.0 - a - b, a, b],
+                point: near * (1.3 + 0.5 * random.unit() as f32),
+                normal: Vec3A::Z,
+            }
+        };
+        let matches: Vec<SampleMatch> = (0..400).map(sample).collect();
+        for pull in PULLS {
+            let error = gradient_error(|shape, weight, gradient| {
+                ScanToTemplate { matches: &matches, pull }.add(shape, weight, gradient)
+            });
+            assert!(error < 2e-3, "{pull:?}: {error}");
+        }
+    }
+}

@@ -35,3 +35,18 @@ impl Foldover {
         sum / topology.edges.len() as f64
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::shape::bumpy::gradient_error;
+    use super::*;
+
+    #[test]
+    fn gradient() {
+        // The bumpy sphere has creases on both sides of this cosine.
+        let error = gradient_error(|shape, weight, gradient| {
+            Foldover { cosine: 0.95, floor: 0.0 }.add(shape, weight, gradient)
+        });
+        assert!(error < 2e-3, "{error}");
+    }
+}

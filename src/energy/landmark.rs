@@ -39,3 +39,26 @@ impl Landmarks<'_> {
         sum / f64::from(count)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::shape::bumpy::{gradient_error, vector};
+    use super::*;
+    use crate::numeric::Random;
+
+    #[test]
+    fn gradient() {
+        let mut random = Random::new(41);
+        let pull = |i: u16| LandmarkPull {
+            triangle: u32::from(i) * 11,
+            weights: [0.5, 0.2, 0.3],
+            target: vector(&mut random),
+            weight: 0.5 + f32::from(i % 3),
+        };
+        let pulls: Vec<LandmarkPull> = (0..20).map(pull).collect();
+        let error = gradient_error(|shape, weight, gradient| {
+            Landmarks { pulls: &pulls }.add(shape, weight, gradient)
+        });
+        assert!(error < 2e-3, "{error}");
+    }
+}

@@ -48,3 +48,42 @@ impl SampleNormals<'_> {
         sum / self.matches.len().max(1) as f64
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::shape::bumpy::{gradient_error, sphere, vector};
+    use super::*;
+    use crate::numeric::Random;
+
+    #[test]
+    fn gradient_at_vertices() {
+        let mut random = Random::new(31);
+        let normal = |i| VertexMatch {
+            point: Vec3A::ZERO,
+            normal: vector(&mut random).normalize(),
+            weight: (i % 3) as f32,
+        };
+        let matches: Vec<VertexMatch> = (0..sphere().1.len()).map(normal).collect();
+        let error = gradient_error(|shape, weight, gradient| {
+            VertexNormals { matches: &matches }.add(shape, weight, gradient)
+        });
+        assert!(error < 2e-3, "{error}");
+    }
+
+    #[test]
+    fn gradient_at_samples() {
+        let mut random = Random::new(32);
+        let triangles = sphere().0.triangles.len();
+        let sample = |i| SampleMatch {
+            triangle: random.below(triangles) as u32,
+            weight: (i % 3) as f32,
+            normal: vector(&mut random).normalize(),
+            ..SampleMatch::default()
+        };
+        let matches: Vec<SampleMatch> = (0..400).map(sample).collect();
+        let error = gradient_error(|shape, weight, gradient| {
+            SampleNormals { matches: &matches, floor: 0.0 }.add(shape, weight, gradient)
+        });
+        assert!(error < 2e-3, "{error}");
+    }
+}

@@ -73,3 +73,41 @@ pub fn add_unit_normal_gradient(
         }
     });
 }
+
+/// What the terms' tests share: a bumpy sphere, and central differences on it.
+#[cfg(test)]
+pub mod bumpy {
+    use super::*;
+    use crate::mesh::Icosphere;
+    use crate::numeric::Random;
+    use crate::numeric::finite_difference::directional_error;
+
+    /// A direction of any length below the square root of three.
+    pub fn vector(random: &mut Random) -> Vec3A {
+        Vec3A::new(random.signed() as f32, random.signed() as f32, random.signed() as f32)
+    }
+
+    /// A sphere of 162 vertices, each moved by chance.
+    pub fn sphere() -> (Topology, Vec<Vec3A>) {
+        let sphere = Icosphere::new(2);
+        let mut random = Random::new(8);
+        let moved = sphere.positions.iter().map(|p| p.as_vec3a() + 0.05 * vector(&mut random)).collect();
+        (Topology::new(sphere.positions.len(), &sphere.triangles), moved)
+    }
+
+    /// The largest error, relative to the steepest slope, of the gradient that a term adds with a weight.
+    pub fn gradient_error(add: impl Fn(Shape, f32, &mut Gradient) -> f64) -> f64 {
+        const WEIGHT: f32 = 0.7;
+        let (topology, positions) = sphere();
+        let of = |positions: &[Vec3A]| {
+            let normals = Normals::new(&topology, positions);
+            let shape = Shape { topology: &topology, positions, normals: &normals };
+            let mut gradient = Gradient::zero(&topology);
+            let value = add(shape, WEIGHT, &mut gradient);
+            (f64::from(WEIGHT) * value, std::mem::take(gradient.total(shape)))
+        };
+        let (_, gradient) = of(&positions);
+        assert!(gradient.iter().any(|g| *g != Vec3A::ZERO), "the term does nothing here");
+        directional_error(&positions, &gradient, 1e-3, 8, |moved| of(moved).0)
+    }
+}

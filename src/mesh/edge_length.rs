@@ -34,3 +34,28 @@ pub fn pull_back_mean_edge_lengths(
         }
     });
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::Icosphere;
+    use crate::numeric::Random;
+    use crate::numeric::finite_difference::directional_error;
+
+    #[test]
+    fn pull_back() {
+        let sphere = Icosphere::new(2);
+        let topology = Topology::new(sphere.positions.len(), &sphere.triangles);
+        let mut random = Random::new(6);
+        let mut number = || random.signed() as f32;
+        let positions: Vec<Vec3A> =
+            sphere.positions.iter().map(|p| p.as_vec3a() * (1.0 + 0.3 * number())).collect();
+        let upstream: Vec<f32> = positions.iter().map(|_| number()).collect();
+        let mut gradient = vec![Vec3A::ZERO; positions.len()];
+        pull_back_mean_edge_lengths(&topology, &positions, &upstream, &mut gradient);
+        let error = directional_error(&positions, &gradient, 1e-3, 8, |p| {
+            mean_edge_lengths(&topology, p).iter().zip(&upstream).map(|(l, g)| f64::from(l * g)).sum()
+        });
+        assert!(error < 2e-3, "{error}");
+    }
+}

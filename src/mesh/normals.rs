@@ -102,3 +102,72 @@ pub fn pull_back_area_vectors(
         }
     });
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+
+    use super::*;
+    use crate::mesh::Icosphere;
+    use crate::numeric::Random;
+    use crate::numeric::finite_difference::directional_error;
+
+    fn vectors(random: &mut Random, count: usize) -> Vec<Vec3A> {
+        let mut number = || random.signed() as f32;
+        (0..count).map(|_| Vec3A::new(number(), number(), number())).collect()
+    }
+
+    /// A bumpy sphere with a hole of every third triangle of its first half: rims, and vertices without a triangle.
+    fn bumpy() -> (Topology, Vec<Vec3A>) {
+        let Icosphere { positions, triangles } = Icosphere::new(2);
+        let moves = vectors(&mut Random::new(7), positions.len());
+        let moved = positions.iter().zip(moves).map(|(p, m)| p.as_vec3a() + 0.05 * m).collect();
+        let half = triangles.len() / 2;
+        let kept: Vec<_> = (triangles.into_iter().enumerate())
+            .filter(|(t, corners)| (t % 3 > 0 || *t > half) && !corners.contains(&20))
+            .map(|(_, corners)| corners)
+            .collect();
+        (Topology::new(positions.len(), &kept), moved)
+    }
+
+    #[test]
+    fn agree_with_a_sum_over_all_triangles() {
+        let (topology, positions) = bumpy();
+        let normals = Normals::new(&topology, &positions);
+        for (i, normal) in normals.vertices.iter().enumerate() {
+            let mut sum = DVec3::ZERO;
+            for corners in topology.triangles.iter().filter(|corners| corners.contains(&(i as u32))) {
+                let [a, b, c] = corners.map(|i| positions[i as usize].as_dvec3());
+                sum += (b - a).cross(c - a);
+            }
+            assert!(normal.as_dvec3().distance(sum.normalize_or_zero()) < 1e-6, "vertex {i}");
+        }
+        assert_eq!(normals.vertices[20], Vec3A::ZERO, "no triangle, no normal");
+    }
+
+    #[test]
+    fn pull_back_of_vertex_normals() {
+        let (topology, positions) = bumpy();
+        let upstream = vectors(&mut Random::new(9), positions.len());
+        let mut gradient = vec![Vec3A::ZERO; positions.len()];
+        Normals::new(&topology, &positions).pull_back(&topology, &positions, &upstream, &mut gradient);
+        let error = directional_error(&positions, &gradient, 1e-3, 8, |p| {
+            let normals = Normals::new(&topology, p).vertices;
+            normals.iter().zip(&upstream).map(|(n, g)| f64::from(n.dot(*g))).sum()
+        });
+        assert!(error < 2e-3, "{error}");
+    }
+
+    #[test]
+    fn pull_back_of_area_vectors() {
+        let (topology, positions) = bumpy();
+        let upstream = vectors(&mut Random::new(10), topology.triangles.len());
+        let mut gradient = vec![Vec3A::ZERO; positions.len()];
+        pull_back_area_vectors(&topology, &positions, &upstream, &mut gradient);
+        let error = directional_error(&positions, &gradient, 1e-3, 8, |p| {
+            let normals = Normals::new(&topology, p);
+            normals.area_vectors.iter().zip(&upstream).map(|(e, g)| f64::from(e.dot(*g))).sum()
+        });
+        assert!(error < 2e-3, "{error}");
+    }
+}

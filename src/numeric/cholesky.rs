@@ -99,6 +99,8 @@ fn permuted(topology: &Topology, matrix: &SymmetricMatrix, order: &[u32]) -> Csc
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::{DMatrix, DVector};
+
     use super::*;
     use crate::mesh::Icosphere;
     use crate::numeric::Random;
@@ -125,6 +127,47 @@ mod tests {
         for (level, lambda) in [(0, 1.0), (1, 19.0), (3, 19.0), (4, 4.0)] {
             let error = residual(level, lambda);
             assert!(error < 1e-4, "level {level}, lambda {lambda}: {error}");
+        }
+    }
+
+    /// Diagonally dominant, otherwise by chance.
+    fn random_matrix(topology: &Topology, random: &mut Random) -> SymmetricMatrix {
+        let edges: Vec<f64> = topology.edges.iter().map(|_| random.signed()).collect();
+        let mut diagonal: Vec<f64> = (0..topology.vertex_count()).map(|_| 0.1 + random.unit()).collect();
+        for (&[a, b], value) in topology.edges.iter().zip(&edges) {
+            diagonal[a as usize] += value.abs();
+            diagonal[b as usize] += value.abs();
+        }
+        SymmetricMatrix { diagonal, edges }
+    }
+
+    #[test]
+    fn agrees_with_a_dense_solve() {
+        let mut random = Random::new(2);
+        let sphere = Icosphere::new(2);
+        let positions: Vec<Vec3A> = sphere.positions.iter().map(|p| p.as_vec3a()).collect();
+        let n = positions.len();
+        // Closed, torn, and in pieces with isolated vertices.
+        for kept in [1.0, 0.7, 0.2] {
+            let triangles: Vec<[u32; 3]> =
+                sphere.triangles.iter().copied().filter(|_| random.unit() < kept).collect();
+            let topology = Topology::new(n, &triangles);
+            let matrix = random_matrix(&topology, &mut random);
+            let mut dense = DMatrix::from_diagonal(&DVector::from_column_slice(&matrix.diagonal));
+            for (&[a, b], &value) in topology.edges.iter().zip(&matrix.edges) {
+                dense[(a as usize, b as usize)] = value;
+                dense[(b as usize, a as usize)] = value;
+            }
+            let b = DMatrix::from_fn(n, 3, |_, _| random.signed());
+            let wanted = dense.cholesky().unwrap().solve(&b);
+            let dissection = Dissection::new(&topology, &positions);
+            let cholesky = SparseCholesky::new(&topology, &matrix, &dissection).unwrap();
+            let row = |m: &DMatrix<f64>, i| Vec3A::from_array([0, 1, 2].map(|k| m[(i, k)] as f32));
+            let mut x: Vec<Vec3A> = (0..n).map(|i| row(&b, i)).collect();
+            cholesky.solve(&mut x, &mut SolveBuffer::default());
+            let size = wanted.abs().max() as f32;
+            let error = (0..n).map(|i| x[i].distance(row(&wanted, i))).fold(0.0, f32::max);
+            assert!(error < 1e-5 * size, "{kept}: {error} of {size}");
         }
     }
 

@@ -1,0 +1,42 @@
+# Works from a fresh checkout on Debian: what is missing is installed first, as root or by sudo.
+
+.PHONY: demo test bench licences rust validator
+
+# The demo collection, registered: meshes, report and picture.
+demo: rust
+	cargo run --release --locked -- demo -o demo
+
+# Every test there is.
+test: rust validator
+	cargo test --workspace --locked
+
+# How long each stage and kernel takes.
+bench: rust
+	cargo run --release --locked -- bench
+
+# Whether every dependency's licence leaves users the choice of ours.
+licences: rust
+	@command -v python3 >/dev/null || $(call apt,python3)
+	.ci/licences
+
+export PATH := $(or $(CARGO_HOME),$(HOME)/.cargo)/bin:$(PATH)
+SUDO := $(shell [ "$$(id -u)" = 0 ] || command -v sudo)
+APT := $(SUDO) env DEBIAN_FRONTEND=noninteractive apt-get -qq
+# $(call apt,PACKAGES) installs Debian packages.
+apt = { $(APT) update && $(APT) install --no-install-recommends $(1); } </dev/null || { echo "please install: $(1)" >&2; false; }
+
+rust:
+	@command -v cc >/dev/null || $(call apt,gcc libc6-dev)
+	@command -v cargo >/dev/null || { \
+		{ command -v curl >/dev/null || $(call apt,ca-certificates curl); } && \
+		curl --proto '=https' --tlsv1.2 -sSf https://sh.rustup.rs | sh -s -- -y --profile minimal && \
+		command -v cargo >/dev/null; }
+
+# Khronos' glTF validator; where node cannot be had, the tests that need it say that they are skipped.
+validator:
+	@command -v npm >/dev/null || $(call apt,nodejs npm) || true
+	@! command -v npm >/dev/null || $(MAKE) -s tests/gltf_validator/node_modules
+
+tests/gltf_validator/node_modules: tests/gltf_validator/package-lock.json
+	npm ci --no-audit --no-fund --prefix $(@D)
+	@touch $@

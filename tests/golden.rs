@@ -1,0 +1,68 @@
+//! Small fits and registrations of sculpted heads reach what they reached before.
+
+use onemesh::demo::{SculptedHead, Sculptor};
+use onemesh::evaluate::{
+    CorrespondenceCase, CorrespondenceOptions, SurfaceFigures, correspondence_figures, surface_figures,
+};
+use onemesh::mesh::TriangleMesh;
+use onemesh::pipeline::{Preset, Settings, Sphere, Subject, fit_scan, register};
+
+/// How much worse than the golden figure a result may be, since rounding differs from processor to processor.
+const SLACK: f64 = 1.25;
+
+fn heads(count: usize) -> Vec<SculptedHead> {
+    let settings = onemesh::demo::Settings { triangles: 15_000, ..Default::default() };
+    Sculptor::new(11).with(settings).collection(count, &[1.5])
+}
+
+fn holds(name: &str, found: f64, golden: f64) {
+    println!("{name}: {found:.2e}");
+    assert!(found <= SLACK * golden, "{name}: {found:.2e}, once {golden:.2e}");
+}
+
+/// Figures of a fit whose template has 2562 vertices.
+fn fitted(preset: Preset) -> SurfaceFigures {
+    let scan = &heads(1)[0].mesh;
+    let settings = Settings::for_fit(preset, 2562).unwrap().fit;
+    let positions = fit_scan("head", scan, &settings, &()).unwrap();
+    let mesh = Sphere::of_level(4).topology.mesh(positions).unwrap();
+    surface_figures(scan, &mesh, true)
+}
+
+#[test]
+fn fit_by_default() {
+    let figures = fitted(Preset::Default);
+    holds("chamfer", figures.chamfer, 5.6e-6);
+    holds("normal", figures.normal, 0.039);
+    holds("flipped", figures.flipped, 0.002);
+    holds("sliver", figures.sliver, 0.001);
+}
+
+#[test]
+fn fit_by_the_paper() {
+    let figures = fitted(Preset::Paper);
+    holds("chamfer", figures.chamfer, 1.43e-5);
+    holds("normal", figures.normal, 0.053);
+}
+
+#[test]
+fn registration() {
+    let heads = heads(3);
+    let subject = |head: &SculptedHead| Subject {
+        name: head.name.clone(),
+        mesh: head.mesh.clone(),
+        landmarks: head.landmarks.clone(),
+    };
+    let subjects: Vec<Subject> = heads.iter().map(subject).collect();
+    let result = register(&subjects, &Settings::preset(Preset::Default, 2562).unwrap(), &()).unwrap();
+    let mesh = |positions: &Vec<_>| TriangleMesh::new(positions.clone(), result.template.triangles.clone());
+    let meshes: Vec<TriangleMesh> = result.members.iter().map(|member| mesh(member).unwrap()).collect();
+    let cases: Vec<CorrespondenceCase> = (heads.iter().zip(&meshes))
+        .map(|(head, mesh)| CorrespondenceCase { scan: &head.mesh, mesh, truth: &head.truth })
+        .collect();
+    let options = CorrespondenceOptions::default();
+    let distances = correspondence_figures(&cases, options).unwrap().distances.unwrap();
+    holds("face_mm", distances.face_mm, 0.22);
+    holds("mean_mm", distances.mean_mm, 1.54);
+    holds("p95_mm", distances.p95_mm, 3.84);
+}
