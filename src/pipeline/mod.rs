@@ -7,6 +7,7 @@ mod presets;
 mod register;
 mod resample;
 mod scan_surface;
+mod setting_name;
 mod settings;
 mod sphere;
 
