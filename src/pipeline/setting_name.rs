@@ -40,13 +40,15 @@ impl Settings {
         Ok(())
     }
 
-    /// Settings from a JSON file's bytes: those that [`Settings`] serialize to, whole.
+    /// Settings from a JSON file's bytes: those that [`Settings`] serialize to, whole, or a manifest with such `settings`.
     ///
     /// # Errors
     /// [`SettingError::File`] with the field and what is wrong with it.
     pub fn from_json(bytes: &[u8]) -> Result<Self, SettingError> {
-        let settings: Self =
-            serde_json::from_slice(bytes).map_err(|error| SettingError::File(error.to_string()))?;
+        let malformed = |error: serde_json::Error| SettingError::File(error.to_string());
+        let mut document: Value = serde_json::from_slice(bytes).map_err(malformed)?;
+        let inner = document.get_mut("settings").map(Value::take);
+        let settings: Self = serde_json::from_value(inner.unwrap_or(document)).map_err(malformed)?;
         settings.check()?;
         Ok(settings)
     }
@@ -227,6 +229,8 @@ mod tests {
     fn settings_survive_their_file() {
         let bytes = serde_json::to_vec(&settings()).unwrap();
         assert_eq!(Settings::from_json(&bytes).unwrap(), settings());
+        let manifest = serde_json::json!({ "settings": settings() }).to_string();
+        assert_eq!(Settings::from_json(manifest.as_bytes()).unwrap(), settings());
         assert!(Settings::from_json(b"{}").unwrap_err().to_string().contains("preset"));
     }
 }
