@@ -1,4 +1,4 @@
-//! Triangle meshes, the landmarks on them, and the template spheres. Layer 1: imports nothing of this crate.
+//! Triangle meshes, the landmarks on them, and the template spheres. Layer 0: imports nothing of this crate.
 
 mod edge_length;
 mod icosphere;

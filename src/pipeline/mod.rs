@@ -19,7 +19,7 @@ pub use comparison::comparison_sheet;
 pub use fit::{SphereLandmark, fit};
 pub use manifest::{InputEntry, LandmarkEntry, Manifest, ScanEntry, TemplateEntry};
 pub use observer::{Canceled, Observer, Progress, Stage, Watch};
-pub use package::{Package, PackageError, layout, vertex_normals};
+pub use package::{Package, PackageError, layout, spare_inputs, vertex_normals};
 pub use register::{LEAST_LANDMARKS, RegisterError, Registration, Subject, Template, fit_scan, register};
 pub use report::{Report, ScanReport};
 pub use scan_surface::{ScanSurface, SurfaceSample};

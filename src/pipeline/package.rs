@@ -85,7 +85,7 @@ impl Package<'_> {
         let start = Instant::now();
         fs::create_dir_all(folder)
             .map_err(|error| PackageError::Folder { path: folder.to_owned(), error })?;
-        self.spare_inputs(folder)?;
+        spare_inputs(folder, self.subjects, self.inputs)?;
         let results = self.results()?;
         let layout = layout(&self.registration.template, self.scheme());
         let scans = self
@@ -106,20 +106,6 @@ impl Package<'_> {
         write_json(&folder.join(REPORT), &report)?;
         write_json(&folder.join(MANIFEST), &self.manifest(&digests))?;
         Ok(report)
-    }
-
-    /// Results beside their scans may have the scans' names.
-    fn spare_inputs(&self, folder: &Path) -> Result<(), PackageError> {
-        let outputs = self.subjects.iter().map(|subject| file_of(&subject.name));
-        let outputs = outputs.chain([MANIFEST, REPORT, SHEET].map(str::to_owned));
-        let outputs: Vec<PathBuf> =
-            outputs.filter_map(|name| fs::canonicalize(folder.join(name)).ok()).collect();
-        let inputs = self.inputs.iter().flatten().map(|input| &input.path);
-        let is_output = |path: &&PathBuf| fs::canonicalize(path).is_ok_and(|path| outputs.contains(&path));
-        match inputs.into_iter().find(is_output) {
-            Some(path) => Err(PackageError::Overwrites { path: path.clone() }),
-            None => Ok(()),
-        }
     }
 
     fn results(&self) -> Result<Vec<TriangleMesh>, PackageError> {
@@ -188,6 +174,26 @@ impl Package<'_> {
             report: REPORT.to_owned(),
             sheet: SHEET.to_owned(),
         }
+    }
+}
+
+/// Whether results can be written to `folder` and all files of the collection stay: results beside their scans might
+/// have the scans' names. Worth asking before the work as well as after it.
+///
+/// # Errors
+/// [`PackageError::Overwrites`] names the file that would not stay.
+pub fn spare_inputs(
+    folder: &Path,
+    subjects: &[Subject],
+    inputs: &[Vec<InputFile>],
+) -> Result<(), PackageError> {
+    let outputs = subjects.iter().map(|subject| file_of(&subject.name));
+    let outputs = outputs.chain([MANIFEST, REPORT, SHEET].map(str::to_owned));
+    let outputs: Vec<PathBuf> = outputs.filter_map(|name| fs::canonicalize(folder.join(name)).ok()).collect();
+    let is_output = |input: &&InputFile| fs::canonicalize(&input.path).is_ok_and(|at| outputs.contains(&at));
+    match inputs.iter().flatten().find(is_output) {
+        Some(input) => Err(PackageError::Overwrites { path: input.path.clone() }),
+        None => Ok(()),
     }
 }
 
