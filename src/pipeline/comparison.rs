@@ -1,3 +1,4 @@
+use glam::DVec3;
 use rayon::prelude::*;
 
 use super::register::Subject;
@@ -5,7 +6,7 @@ use crate::mesh::TriangleMesh;
 use crate::picture::{Frame, Image, Sheet, Style, View, render};
 
 /// Pixels of a picture's sides.
-const SIDE: usize = 360;
+const SIDE: usize = 400;
 /// Most scans on one sheet; more make it larger than people look at.
 const MOST: usize = 32;
 
@@ -24,7 +25,7 @@ pub fn comparison_sheet(subjects: &[Subject], results: &[TriangleMesh]) -> Image
 }
 
 fn row(subject: &Subject, result: &TriangleMesh) -> Vec<(String, Image)> {
-    let frame = Frame::around(&subject.mesh);
+    let frame = frame(&subject.mesh);
     let picture = |mesh: &TriangleMesh, view: View, style: &Style| {
         render(mesh, &view.sized(SIDE, SIDE).framed(frame), style)
     };
@@ -36,4 +37,11 @@ fn row(subject: &Subject, result: &TriangleMesh) -> Vec<(String, Image)> {
         ("scan".to_owned(), picture(scan, View::side(), &smooth)),
         ("its triangles".to_owned(), picture(result, View::side(), &edges)),
     ]
+}
+
+/// The frame that just holds a scan's bounding box from the front and from the side.
+fn frame(scan: &TriangleMesh) -> Frame {
+    let low = scan.positions().iter().copied().fold(DVec3::INFINITY, DVec3::min);
+    let high = scan.positions().iter().copied().fold(DVec3::NEG_INFINITY, DVec3::max);
+    Frame { radius: (high - low).max_element() / 2.0, ..Frame::around(scan) }
 }
