@@ -1,5 +1,6 @@
 use glam::DVec3;
-use nalgebra_sparse::{CooMatrix, CsrMatrix};
+
+use crate::mesh::Rows;
 
 /// Where the conjugate gradient stops: the residual over the right-hand side, in the preconditioner's norm.
 const TOLERANCE: f64 = 1e-7;
@@ -22,7 +23,7 @@ pub(super) fn curvature(positions: &[DVec3], triangles: &[[u32; 3]], step: f64) 
 /// One implicit smoothing step.
 struct Smoothing {
     /// `M - step L`, `[N, N]`, with the columns of each row in rising order.
-    matrix: CsrMatrix<f64>,
+    matrix: Rows<(u32, f64)>,
     /// One over its diagonal.
     inverse: Vec<f64>,
     /// The diagonal of M: a third of the area around each vertex.
@@ -32,7 +33,7 @@ struct Smoothing {
 impl Smoothing {
     fn new(positions: &[DVec3], triangles: &[[u32; 3]], step: f64) -> Self {
         let count = positions.len();
-        let mut entries = CooMatrix::new(count, count);
+        let mut entries = Vec::with_capacity(6 * triangles.len() + count);
         let mut mass = vec![0.0; count];
         let mut diagonal = vec![0.0; count];
         for corners in triangles {
@@ -40,8 +41,8 @@ impl Smoothing {
             for k in 0..3 {
                 let [at, from, to] = [0, 1, 2].map(|turn| corners[(k + turn) % 3] as usize);
                 let weight = step / 2.0 * cotangents[k];
-                entries.push(from, to, -weight);
-                entries.push(to, from, -weight);
+                entries.push(([from as u32, to as u32], -weight));
+                entries.push(([to as u32, from as u32], -weight));
                 diagonal[from] += weight;
                 diagonal[to] += weight;
                 mass[at] += area / 3.0;
@@ -55,10 +56,10 @@ impl Smoothing {
             *d += *mass;
         }
         for (at, &d) in diagonal.iter().enumerate() {
-            entries.push(at, at, d);
+            entries.push(([at as u32; 2], d));
         }
         let inverse = diagonal.iter().map(|d| 1.0 / d).collect();
-        Self { matrix: CsrMatrix::from(&entries), inverse, mass }
+        Self { matrix: rows(count, entries), inverse, mass }
     }
 
     /// Solves for the smoothed positions by conjugate gradients started at `v`; the three coordinates run side by side.
@@ -91,41 +92,48 @@ impl Smoothing {
 
     /// The matrix times `x`.
     fn product(&self, x: &[DVec3]) -> Vec<DVec3> {
-        let (offsets, columns, values) = self.matrix.csr_data();
-        offsets
-            .array_windows()
-            .map(|&[start, end]| {
-                columns[start..end].iter().zip(&values[start..end]).map(|(&at, &value)| value * x[at]).sum()
-            })
-            .collect()
+        let row = |row| self.matrix.row(row).iter().map(|&(at, value)| value * x[at as usize]).sum();
+        (0..self.matrix.len()).map(row).collect()
     }
 
     /// One sweep of Gauss-Seidel down the rows and one up, from zero: symmetric, as conjugate gradients ask.
     fn preconditioned(&self, r: &[DVec3]) -> Vec<DVec3> {
-        let (offsets, columns, values) = self.matrix.csr_data();
         let mut z = r.to_vec();
-        for (row, &[start, end]) in offsets.array_windows().enumerate() {
+        for row in 0..z.len() {
             let mut sum = r[row];
-            for (&at, &value) in columns[start..end].iter().zip(&values[start..end]) {
-                if at >= row {
+            for &(at, value) in self.matrix.row(row) {
+                if at as usize >= row {
                     break;
                 }
-                sum -= value * z[at];
+                sum -= value * z[at as usize];
             }
             z[row] = sum * self.inverse[row];
         }
-        for (row, &[start, end]) in offsets.array_windows().enumerate().rev() {
+        for row in (0..z.len()).rev() {
             let mut sum = DVec3::ZERO;
-            for (&at, &value) in columns[start..end].iter().zip(&values[start..end]).rev() {
-                if at <= row {
+            for &(at, value) in self.matrix.row(row).iter().rev() {
+                if at as usize <= row {
                     break;
                 }
-                sum += value * z[at];
+                sum += value * z[at as usize];
             }
             z[row] -= sum * self.inverse[row];
         }
         z
     }
+}
+
+/// The rows of a square matrix, columns rising, from entries `([row, column], value)`; those of one place add up.
+fn rows(count: usize, mut entries: Vec<([u32; 2], f64)>) -> Rows<(u32, f64)> {
+    // Stable, so that what adds up does so in one order.
+    entries.sort_by_key(|&(place, _)| place);
+    entries.dedup_by(|next, sum| {
+        let same = next.0 == sum.0;
+        sum.1 += if same { next.1 } else { 0.0 };
+        same
+    });
+    let pairs: Vec<_> = entries.into_iter().map(|([row, column], value)| (row, (column, value))).collect();
+    Rows::from_pairs(count, &pairs)
 }
 
 /// The cotangents of a triangle's angles and its area; zeros if it is degenerate.

@@ -1,10 +1,11 @@
 //! Figures that say how good a result is: how closely a mesh lies on its scan, and how well the same point of the
-//! shared mesh marks the same anatomical point on every scan. Layer 4.
+//! shared mesh marks the same anatomical point on every scan. Layer 3.
 
 mod border;
 mod correspondence;
 mod curvature;
 mod dense_points;
+mod fidelity;
 mod samples;
 mod statistics;
 mod surface;
@@ -17,4 +18,5 @@ pub use correspondence::{
     correspondence_figures,
 };
 pub use dense_points::{DensePointsError, dense_points_from_json, dense_points_from_npy};
+pub use fidelity::{Distances, Fidelity};
 pub use surface_figures::{SurfaceFigures, surface_figures};

@@ -12,7 +12,7 @@ use crate::spatial::Hit;
 /// Samples drawn from each surface.
 const SAMPLES: usize = 200_000;
 /// Seeds of the samples on the scan and on the mesh.
-const SEEDS: [u64; 2] = [1, 2];
+pub(super) const SEEDS: [u64; 2] = [1, 2];
 /// Smoothing step at which curvature is felt, in squared radii: a scale of about 3 % of the radius.
 const CURVATURE_STEP: f64 = 0.0004;
 /// Quality under which a triangle counts as a sliver: 1 is equilateral, 0 degenerate.
@@ -52,11 +52,11 @@ pub fn surface_figures(scan: &TriangleMesh, mesh: &TriangleMesh, open: bool) -> 
     let (scan, mesh) = (Surface::new(scan, &space), Surface::new(mesh, &space));
     let border = Border::of(scan.positions.len(), scan.triangles);
 
-    let onto_mesh = Pairs::between(&scan, &mesh, SEEDS[0], |_| true);
+    let onto_mesh = Pairs::between(&scan, &mesh, SAMPLES, SEEDS[0], |_| true);
     let (mut chamfer, mut normal, mut largest) =
         (mean(&onto_mesh.distances), mean(&onto_mesh.turns), maximum(&onto_mesh.distances));
     if !open {
-        let onto_scan = Pairs::between(&mesh, &scan, SEEDS[1], |hit| !border.holds(hit));
+        let onto_scan = Pairs::between(&mesh, &scan, SAMPLES, SEEDS[1], |hit| !border.holds(hit));
         chamfer += mean(&onto_scan.distances);
         normal = (normal + mean(&onto_scan.turns)) / 2.0;
         largest = largest.max(maximum(&onto_scan.distances));
@@ -77,19 +77,25 @@ pub fn surface_figures(scan: &TriangleMesh, mesh: &TriangleMesh, open: bool) -> 
 }
 
 /// Samples of one surface, each with the nearest point of another.
-struct Pairs {
+pub(super) struct Pairs {
     /// The sampled triangles.
-    triangles: Vec<u32>,
+    pub triangles: Vec<u32>,
     /// Squared distances.
-    distances: Vec<f64>,
+    pub distances: Vec<f64>,
     /// Squared differences of the unit normals.
-    turns: Vec<f64>,
+    pub turns: Vec<f64>,
 }
 
 impl Pairs {
-    /// Pairs whose nearest point `counts`.
-    fn between(from: &Surface, to: &Surface, seed: u64, counts: impl Fn(&Hit) -> bool) -> Self {
-        let samples = Samples::new(from, SAMPLES, seed);
+    /// Pairs of `count` samples whose nearest point `counts`.
+    pub fn between(
+        from: &Surface,
+        to: &Surface,
+        count: usize,
+        seed: u64,
+        counts: impl Fn(&Hit) -> bool,
+    ) -> Self {
+        let samples = Samples::new(from, count, seed);
         let hits = to.closest(&samples.points);
         let mut pairs = Self { triangles: Vec::new(), distances: Vec::new(), turns: Vec::new() };
         for (&triangle, hit) in samples.triangles.iter().zip(&hits).filter(|(_, hit)| counts(hit)) {
@@ -116,7 +122,7 @@ fn triangle_curvature(surface: &Surface) -> Vec<f64> {
     surface.triangles.iter().map(|t| t.iter().map(|&v| at_vertex[v as usize]).sum::<f64>() / 3.0).collect()
 }
 
-fn flipped_share(mesh: &Surface, scan: &Surface, border: &Border) -> f64 {
+pub(super) fn flipped_share(mesh: &Surface, scan: &Surface, border: &Border) -> f64 {
     let count = mesh.triangles.len();
     let centres: Vec<DVec3> =
         (0..count as u32).map(|t| mesh.corners(t).iter().sum::<DVec3>() / 3.0).collect();
@@ -127,7 +133,7 @@ fn flipped_share(mesh: &Surface, scan: &Surface, border: &Border) -> f64 {
     hits.iter().enumerate().filter(flipped).count() as f64 / count as f64
 }
 
-fn sliver_share(mesh: &Surface) -> f64 {
+pub(super) fn sliver_share(mesh: &Surface) -> f64 {
     let count = mesh.triangles.len();
     let sliver = |&triangle: &usize| {
         let [a, b, c] = mesh.corners(triangle as u32);

@@ -6,7 +6,7 @@ use glam::{DVec2, DVec3};
 use serde_json::{Map, Value, json};
 
 use super::error::{Fault, FormatError};
-use super::input::write_file;
+use super::output::write_whole;
 use crate::mesh::TriangleMesh;
 
 /// How the `asset.generator` of files by this program begins.
@@ -50,7 +50,7 @@ impl<'a> Glb<'a> {
 pub fn write_glb(path: impl AsRef<Path>, glb: &Glb) -> Result<(), FormatError> {
     let path = path.as_ref();
     let bytes = glb_bytes(glb).map_err(|error| error.in_file(path))?;
-    write_file(path, &bytes)
+    write_whole(path, &bytes)
 }
 
 /// The mesh as binary glTF 2.0; the same input gives the same bytes.

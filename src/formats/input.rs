@@ -35,10 +35,6 @@ pub(super) fn read_file(path: &Path) -> Result<Vec<u8>, FormatError> {
     read_regular(path).map_err(|error| FormatError::from(Fault::Unreadable(error)).in_file(path))
 }
 
-pub(super) fn write_file(path: &Path, bytes: &[u8]) -> Result<(), FormatError> {
-    fs::write(path, bytes).map_err(|error| FormatError::from(Fault::Unwritable(error)).in_file(path))
-}
-
 /// The files beside the one being read, which it may name.
 pub(super) struct Siblings {
     folder: Option<PathBuf>,

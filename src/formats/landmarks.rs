@@ -11,7 +11,8 @@ use serde_json::value::RawValue;
 use serde_json::{Value, json};
 
 use super::error::{Fault, FormatError};
-use super::input::{read_file, write_file};
+use super::input::read_file;
+use super::output::write_whole;
 use super::scheme::Scheme;
 use super::text::{shown, without_mark};
 use crate::mesh::LandmarkSet;
@@ -232,7 +233,7 @@ pub fn landmarks_json(set: &LandmarkSet) -> Value {
 /// # Errors
 /// [`FormatError`] where the file cannot be written.
 pub fn write_landmarks(path: impl AsRef<Path>, set: &LandmarkSet) -> Result<(), FormatError> {
-    write_file(path.as_ref(), landmarks_json(set).to_string().as_bytes())
+    write_whole(path.as_ref(), landmarks_json(set).to_string().as_bytes())
 }
 
 #[cfg(test)]

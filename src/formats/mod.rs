@@ -15,6 +15,7 @@ mod mesh_format;
 #[cfg(test)]
 mod mutation;
 mod obj;
+mod output;
 mod ply;
 mod scheme;
 mod text;
@@ -29,6 +30,7 @@ pub use input::InputFile;
 pub use landmarks::{landmarks_json, parse_landmarks, read_landmarks, write_landmarks};
 pub use mesh_format::MeshFormat;
 pub use obj::{obj_bytes, write_obj};
+pub use output::write_whole;
 pub use ply::{ply_bytes, write_ply};
 pub use scheme::{Region, Scheme};
 

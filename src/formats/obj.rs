@@ -7,7 +7,7 @@ use glam::DVec3;
 
 use super::error::{Fault, FormatError};
 use super::geometry::{Fan, Geometry};
-use super::input::write_file;
+use super::output::write_whole;
 use super::text::{Lines, finite, integer, shown, without_mark, words};
 use crate::mesh::TriangleMesh;
 
@@ -123,7 +123,7 @@ fn write_statements(mesh: &TriangleMesh, out: &mut Vec<u8>) -> std::io::Result<(
 /// # Errors
 /// [`FormatError`] where the file cannot be written.
 pub fn write_obj(path: impl AsRef<Path>, mesh: &TriangleMesh) -> Result<(), FormatError> {
-    write_file(path.as_ref(), &obj_bytes(mesh))
+    write_whole(path.as_ref(), &obj_bytes(mesh))
 }
 
 #[cfg(test)]

@@ -1,9 +1,10 @@
-//! Triangle meshes, the landmarks on them, and the template spheres. Layer 1: imports nothing of this crate.
+//! Triangle meshes, the landmarks on them, and the template spheres. Layer 0: imports nothing of this crate.
 
 mod edge_length;
 mod icosphere;
 mod landmark;
 mod normals;
+mod sphere_layout;
 mod topology;
 mod triangle_mesh;
 
@@ -11,5 +12,6 @@ pub use edge_length::{mean_edge_lengths, pull_back_mean_edge_lengths};
 pub use icosphere::{Icosphere, Midpoints};
 pub use landmark::{LandmarkSet, SurfacePoint};
 pub use normals::{Normals, pull_back_area_vectors};
+pub use sphere_layout::sphere_layout;
 pub use topology::{Rows, Topology};
 pub use triangle_mesh::{MeshError, TriangleId, TriangleMesh, VertexId};

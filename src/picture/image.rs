@@ -1,5 +1,5 @@
 use std::fs::File;
-use std::io::BufWriter;
+use std::io::{BufWriter, Write};
 use std::path::Path;
 
 use super::Colour;
@@ -64,13 +64,26 @@ impl Image {
         }
     }
 
+    /// The image as the bytes of a PNG file; the same image gives the same bytes.
+    ///
+    /// # Errors
+    /// [`PictureError`] for an image without pixels, or too large for PNG.
+    pub fn png_bytes(&self) -> Result<Vec<u8>, PictureError> {
+        let mut bytes = Vec::new();
+        self.encode(&mut bytes)?;
+        Ok(bytes)
+    }
+
     /// Writes the image as a PNG file.
     ///
     /// # Errors
     /// [`PictureError`] if the file cannot be created or written.
     pub fn write_png(&self, path: &Path) -> Result<(), PictureError> {
-        let file = BufWriter::new(File::create(path)?);
-        let mut encoder = png::Encoder::new(file, self.width as u32, self.height as u32);
+        self.encode(BufWriter::new(File::create(path)?))
+    }
+
+    fn encode(&self, out: impl Write) -> Result<(), PictureError> {
+        let mut encoder = png::Encoder::new(out, self.width as u32, self.height as u32);
         encoder.set_color(png::ColorType::Rgb);
         encoder.set_depth(png::BitDepth::Eight);
         encoder.write_header()?.write_image_data(self.pixels.as_flattened())?;

@@ -1,18 +1,27 @@
 //! The paper's stages over a collection: fit, resample, register, and what we add to them. Layer 4.
 
+mod comparison;
 mod fit;
 mod groupwise;
+mod manifest;
 mod observer;
+mod package;
 mod presets;
 mod register;
+mod report;
 mod resample;
 mod scan_surface;
+mod setting_name;
 mod settings;
 mod sphere;
 
+pub use comparison::comparison_sheet;
 pub use fit::{SphereLandmark, fit};
+pub use manifest::{InputEntry, LandmarkEntry, Manifest, ScanEntry, TemplateEntry};
 pub use observer::{Canceled, Observer, Progress, Stage, Watch};
+pub use package::{Package, PackageError, layout, spare_inputs, vertex_normals};
 pub use register::{LEAST_LANDMARKS, RegisterError, Registration, Subject, Template, fit_scan, register};
+pub use report::{Report, ScanReport};
 pub use scan_surface::{ScanSurface, SurfaceSample};
 pub use settings::{
     Density, FitSettings, GroupwiseSettings, LevelSettings, Preset, Ramp, ResampleSettings, SettingError,

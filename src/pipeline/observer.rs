@@ -14,6 +14,19 @@ pub enum Stage {
     Groupwise,
 }
 
+impl std::fmt::Display for Stage {
+    fn fmt(&self, out: &mut std::fmt::Formatter) -> std::fmt::Result {
+        // Padded where it is asked for, as the names in a table are.
+        out.pad(match self {
+            Self::Prepare => "prepare",
+            Self::Fit => "fit",
+            Self::Resample => "resample",
+            Self::Register => "register",
+            Self::Groupwise => "groupwise",
+        })
+    }
+}
+
 /// How far a stage has come on one scan.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Progress<'a> {

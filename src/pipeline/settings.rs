@@ -159,6 +159,17 @@ pub enum SettingError {
         /// What exists there.
         known: String,
     },
+    /// The levels of a fit do not follow one another.
+    #[error("the levels of {stage:?} {problem}")]
+    Levels {
+        /// Which fit.
+        stage: &'static str,
+        /// What is wrong.
+        problem: String,
+    },
+    /// A file that holds no settings.
+    #[error("these are no settings: {0}; begin with those of a manifest")]
+    File(String),
     /// Not a value for that parameter.
     #[error("parameter {name:?} cannot be {value:?}: {reason}")]
     Value {

@@ -1,7 +1,7 @@
 use std::path::Path;
 
 use crate::formats::error::FormatError;
-use crate::formats::input::write_file;
+use crate::formats::output::write_whole;
 use crate::mesh::TriangleMesh;
 
 /// The mesh as binary little-endian PLY, vertices in their order, coordinates as doubles: read back, it is the same mesh.
@@ -29,5 +29,5 @@ pub fn ply_bytes(mesh: &TriangleMesh) -> Vec<u8> {
 /// # Errors
 /// [`FormatError`] where the file cannot be written.
 pub fn write_ply(path: impl AsRef<Path>, mesh: &TriangleMesh) -> Result<(), FormatError> {
-    write_file(path.as_ref(), &ply_bytes(mesh))
+    write_whole(path.as_ref(), &ply_bytes(mesh))
 }

@@ -1,0 +1,77 @@
+use std::hint::black_box;
+
+use glam::Vec3A;
+use onemesh::mesh::{Icosphere, Normals, Topology, TriangleMesh, mean_edge_lengths};
+use onemesh::numeric::{Dissection, SolveBuffer, SparseCholesky, SymmetricMatrix};
+use onemesh::pipeline::ScanSurface;
+use onemesh::spatial::SurfaceIndex;
+
+use super::clock::Clock;
+
+/// The paper's lambda.
+const LAMBDA: f64 = 19.0;
+/// Queries in a run.
+const QUERIES: u32 = 10_000;
+
+fn sphere(vertices: usize) -> (Topology, Vec<Vec3A>) {
+    let sphere = Icosphere::new(Icosphere::level_of(vertices).unwrap_or(0));
+    let topology = Topology::new(sphere.positions.len(), &sphere.triangles);
+    (topology, sphere.positions.iter().map(|p| p.as_vec3a()).collect())
+}
+
+/// Ordering, factor and solve on each template.
+pub fn solves(clock: &Clock, finest: usize) {
+    for vertices in [2562, 10242, 40962].into_iter().filter(|&vertices| vertices <= finest) {
+        let (topology, positions) = sphere(vertices);
+        let matrix = SymmetricMatrix::diffusion(&topology, LAMBDA);
+        let dissection = Dissection::new(&topology, &positions);
+        clock.kernel(&format!("ordering, {vertices} vertices"), || {
+            black_box(Dissection::new(&topology, &positions));
+        });
+        let factor = || SparseCholesky::new(&topology, &matrix, &dissection);
+        clock.kernel(&format!("factor, {vertices} vertices"), || drop(black_box(factor())));
+        let Ok(cholesky) = factor() else { continue };
+        let (mut x, mut buffer) = (positions.clone(), SolveBuffer::default());
+        clock.kernel_each(&format!("solve of three right-hand sides, {vertices} vertices"), 20, &mut || {
+            for _ in 0..20 {
+                x.copy_from_slice(&positions);
+                cholesky.solve(&mut x, &mut buffer);
+            }
+        });
+    }
+}
+
+/// Nearest points of a scan, on one thread, from near and from far.
+pub fn nearest_points(clock: &Clock, name: &str, mesh: &TriangleMesh) {
+    let scan = ScanSurface::new(mesh, QUERIES as usize);
+    clock.kernel(&format!("scan made ready ({name})"), || {
+        black_box(ScanSurface::new(mesh, QUERIES as usize));
+    });
+    for (from, distance) in [("near", 0.01), ("far", 0.3)] {
+        let mut all = || {
+            for sample in &scan.samples {
+                black_box(scan.index.closest(sample.point + distance * sample.normal));
+            }
+        };
+        clock.kernel_each(&format!("nearest point, {from}, a query ({name})"), QUERIES, &mut all);
+    }
+}
+
+/// What an iteration does beside its solves and searches on the scan, at 10242 vertices.
+pub fn iteration(clock: &Clock) {
+    let (topology, positions) = sphere(10242);
+    let mut normals = Normals::new(&topology, &positions);
+    clock.kernel("iteration: normals", || normals.update(&topology, &positions));
+    let mut gradient = vec![Vec3A::ZERO; positions.len()];
+    clock.kernel("iteration: pull-back of the normals", || {
+        normals.pull_back(&topology, &positions, &positions, &mut gradient);
+    });
+    clock.kernel("iteration: mean edge lengths", || {
+        black_box(mean_edge_lengths(&topology, &positions));
+    });
+    let mut index = SurfaceIndex::new(&positions, &topology.triangles);
+    clock.kernel("iteration: search tree rebuilt", || {
+        black_box(SurfaceIndex::new(&positions, &topology.triangles));
+    });
+    clock.kernel("iteration: search tree refitted", || index.refit(&positions));
+}

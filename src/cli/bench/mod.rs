@@ -1,0 +1,106 @@
+//! Medians of repeated runs, as a markdown table.
+
+mod clock;
+mod kernels;
+mod memory;
+mod stages;
+
+use std::path::PathBuf;
+
+use anyhow::Context;
+use onemesh::demo::{SculptedHead, Sculptor, Settings};
+use onemesh::formats::read_mesh;
+use onemesh::mesh::TriangleMesh;
+
+use clock::Clock;
+
+/// Triangles of a sculpted scan.
+const TRIANGLES: usize = 120_000;
+/// Scans of a sculpted collection.
+const HEADS: usize = 12;
+
+/// Times kernels and stages on this machine, and prints a markdown table of medians.
+#[derive(Debug, clap::Args)]
+pub struct Bench {
+    /// Scans to fit, and collections (folders or manifests) to register; sculpted heads unless given
+    inputs: Vec<PathBuf>,
+    /// Fewer repetitions, no template of 40962 vertices, a smaller sculpted collection
+    #[arg(long)]
+    quick: bool,
+    /// Leaves a part out; may be repeated
+    #[arg(long, value_enum, value_name = "PART")]
+    skip: Vec<Part>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum Part {
+    /// Solves, orderings, factors, nearest points, the parts of an iteration
+    Kernels,
+    /// One scan with the `default` preset
+    Fits,
+    /// One scan with the `paper` preset
+    Paper,
+    /// A whole collection, from reading to written results
+    Collection,
+}
+
+impl Bench {
+    /// Does it.
+    pub fn run(self) -> anyhow::Result<()> {
+        let (collections, scans): (Vec<PathBuf>, Vec<PathBuf>) =
+            self.inputs.iter().cloned().partition(|path| is_collection(path));
+        let sculpted = self.inputs.is_empty();
+        let clock = Clock::new(if self.quick { 1 } else { 5 });
+        clock.head();
+        // First, while nothing else has taken memory.
+        if self.does(Part::Collection) {
+            collections.iter().try_for_each(|path| stages::collection(path))?;
+            if sculpted {
+                stages::sculpted_collection(if self.quick { 3 } else { HEADS }, TRIANGLES)?;
+            }
+        }
+        let finest = if self.quick { 10242 } else { 40962 };
+        for (name, scan) in scans_of(&scans, sculpted)? {
+            if self.does(Part::Kernels) {
+                kernels::nearest_points(&clock, &name, &scan);
+            }
+            if self.does(Part::Fits) {
+                stages::fits(&clock, &name, &scan, finest)?;
+            }
+            if self.does(Part::Paper) {
+                stages::paper(&clock, &name, &scan)?;
+            }
+        }
+        if self.does(Part::Kernels) {
+            kernels::solves(&clock, finest);
+            kernels::iteration(&clock);
+        }
+        Ok(())
+    }
+
+    fn does(&self, part: Part) -> bool {
+        !self.skip.contains(&part)
+    }
+}
+
+fn is_collection(path: &std::path::Path) -> bool {
+    path.is_dir() || path.extension().is_some_and(|extension| extension == "json")
+}
+
+fn scans_of(paths: &[PathBuf], sculpted: bool) -> anyhow::Result<Vec<(String, TriangleMesh)>> {
+    if sculpted {
+        let head = sculpt(1, TRIANGLES).remove(0);
+        return Ok(vec![(format!("sculpted, {} triangles", head.mesh.triangles().len()), head.mesh)]);
+    }
+    let read = |path: &PathBuf| {
+        let mesh = read_mesh(path).with_context(|| "a scan to fit")?;
+        let name = path.file_stem().unwrap_or_default().to_string_lossy();
+        Ok((format!("{name}, {} triangles", mesh.triangles().len()), mesh))
+    };
+    paths.iter().map(read).collect()
+}
+
+/// Sculpted heads of about this many triangles.
+fn sculpt(count: usize, triangles: usize) -> Vec<SculptedHead> {
+    Sculptor::new(3).with(Settings { triangles, ..Settings::default() }).collection(count, &[1.0, 2.0])
+}

@@ -1,0 +1,97 @@
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use anyhow::Context;
+use onemesh::formats::{Collection, InputFile, Scan};
+use onemesh::pipeline::{Package, Registration, Report, Settings, Subject, register, spare_inputs};
+use rayon::prelude::*;
+
+use super::parameters::Parameters;
+use super::progress::ProgressBars;
+
+/// Registers a collection: the same triangles on every scan.
+#[derive(Debug, clap::Args)]
+pub struct Register {
+    /// A folder of `NAME/scan.ply` with `NAME/landmarks.json`, or of `NAME.ply` with `NAME.landmarks.json`; or a JSON
+    /// manifest that names them
+    collection: PathBuf,
+    /// The folder to write to: `NAME.glb` for each scan, manifest.json, report.json, sheet.png
+    #[arg(short, long, value_name = "FOLDER")]
+    output: PathBuf,
+    #[command(flatten)]
+    parameters: Parameters,
+}
+
+impl Register {
+    /// Does it.
+    pub fn run(self) -> anyhow::Result<()> {
+        let settings = self.parameters.for_registration()?;
+        let outcome = register_collection(&self.collection, &self.output, &settings)?;
+        outcome.print(&self.output);
+        Ok(())
+    }
+}
+
+/// A registered collection that has been written.
+pub struct Outcome {
+    /// The scans.
+    pub subjects: Vec<Subject>,
+    /// Their results.
+    pub registration: Registration,
+    /// How well it went.
+    pub report: Report,
+}
+
+/// Reads a collection, registers it and writes the results to a folder.
+pub fn register_collection(collection: &Path, output: &Path, settings: &Settings) -> anyhow::Result<Outcome> {
+    let start = Instant::now();
+    let bars = ProgressBars::new();
+    let spinner = bars.spinner("reading");
+    let (subjects, inputs) = read(collection)?;
+    let reading = start.elapsed().as_secs_f64();
+    spinner.finish_and_clear();
+    spare_inputs(output, &subjects, &inputs)?;
+    let registration =
+        register(&subjects, settings, &bars).with_context(|| collection.display().to_string())?;
+    let spinner = bars.spinner("writing");
+    let root = if collection.is_dir() { collection } else { collection.parent().unwrap_or(Path::new("")) };
+    let registered = &registration;
+    let package =
+        Package { subjects: &subjects, inputs: &inputs, root, settings, registration: registered, reading };
+    let report = package.write(output)?;
+    spinner.finish_and_clear();
+    Ok(Outcome { subjects, registration, report })
+}
+
+/// The scans of a collection and the files they were read from.
+pub fn read(collection: &Path) -> anyhow::Result<(Vec<Subject>, Vec<Vec<InputFile>>)> {
+    let collection = Collection::open(collection)?;
+    let scans: Result<Vec<Scan>, _> = collection.members().par_iter().map(|member| member.read()).collect();
+    let split = |scan: Scan| {
+        let Scan { name, mesh, landmarks, inputs } = scan;
+        (Subject { name, mesh, landmarks }, inputs)
+    };
+    Ok(scans?.into_iter().map(split).unzip())
+}
+
+impl Outcome {
+    /// Says how it went and where the results are.
+    pub fn print(&self, output: &Path) {
+        let widest = self.report.scans.iter().map(|scan| scan.name.len()).max().unwrap_or(0);
+        for scan in &self.report.scans {
+            let fidelity = &scan.fidelity;
+            let median = fidelity.scan_to_mesh.map_or(f64::NAN, |distances| distances.p50);
+            let worst = fidelity.scan_to_mesh.map_or(f64::NAN, |distances| distances.p99);
+            println!(
+                "{:widest$}  distance median {median:.3e}, 99 % {worst:.3e}; landmarks {:.3e}; flipped {:.2} %, sliver {:.2} %",
+                scan.name,
+                scan.landmark_mean,
+                100.0 * fidelity.flipped,
+                100.0 * fidelity.sliver,
+            );
+        }
+        let seconds: f64 = self.report.seconds.values().sum();
+        println!("{} scans in {seconds:.1} s: {}", self.report.scans.len(), output.display());
+        println!("look at {}", output.join("sheet.png").display());
+    }
+}

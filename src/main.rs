@@ -1,0 +1,37 @@
+//! The command line.
+
+mod cli;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+/// One mesh for every face: registers collections of 3D face scans onto one shared triangle mesh.
+#[derive(Debug, Parser)]
+#[command(version)]
+struct Arguments {
+    #[command(flatten)]
+    threads: cli::Threads,
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Register(cli::Register),
+    Fit(cli::Fit),
+    Evaluate(cli::Evaluate),
+    Demo(cli::Demo),
+    Bench(cli::Bench),
+}
+
+fn main() -> ExitCode {
+    let Arguments { threads, command } = Arguments::parse();
+    cli::finish(threads.apply().and_then(|()| match command {
+        Command::Register(command) => command.run(),
+        Command::Fit(command) => command.run(),
+        Command::Evaluate(command) => command.run(),
+        Command::Demo(command) => command.run(),
+        Command::Bench(command) => command.run(),
+    }))
+}

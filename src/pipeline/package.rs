@@ -1,0 +1,246 @@
+//! What a registration leaves behind: a GLB for each scan, the manifest, the report and the comparison sheet.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use glam::{DVec2, DVec3};
+use rayon::prelude::*;
+use serde_json::{Value, json};
+
+use super::comparison::comparison_sheet;
+use super::manifest::{InputEntry, Manifest, ScanEntry, TemplateEntry};
+use super::register::{Registration, Subject, Template};
+use super::report::{Report, ScanReport, position};
+use super::settings::Settings;
+use crate::formats::{FormatError, Glb, InputFile, Region, Scheme, Sha256, glb_bytes, write_whole};
+use crate::mesh::{LandmarkSet, MeshError, Topology, TriangleMesh, sphere_layout};
+use crate::picture::PictureError;
+
+/// Version of manifest and report.
+const RECORD: u32 = 1;
+const MANIFEST: &str = "manifest.json";
+const REPORT: &str = "report.json";
+const SHEET: &str = "sheet.png";
+
+/// A registered collection on its way to disk.
+#[derive(Debug, Clone)]
+pub struct Package<'a> {
+    /// The scans.
+    pub subjects: &'a [Subject],
+    /// The files each was read from.
+    pub inputs: &'a [Vec<InputFile>],
+    /// The folder of the collection; the manifest names its files from there.
+    pub root: &'a Path,
+    /// What was used.
+    pub settings: &'a Settings,
+    /// The results.
+    pub registration: &'a Registration,
+    /// How long the scans took to read.
+    pub reading: f64,
+}
+
+/// Why results cannot be written.
+#[derive(Debug, thiserror::Error)]
+pub enum PackageError {
+    /// The folder cannot be made.
+    #[error("{}: cannot be made a folder: {error}", path.display())]
+    Folder {
+        /// The folder.
+        path: PathBuf,
+        /// What the system says.
+        error: io::Error,
+    },
+    /// A result would take the place of a scan.
+    #[error("{}: is a file of the collection and would be overwritten: choose another folder", path.display())]
+    Overwrites {
+        /// The scan's file.
+        path: PathBuf,
+    },
+    /// A result is no mesh.
+    #[error("the result of scan `{name}` cannot be kept: {error}")]
+    Result {
+        /// The scan.
+        name: String,
+        /// What is wrong with it.
+        error: MeshError,
+    },
+    /// A file cannot be written.
+    #[error(transparent)]
+    File(#[from] FormatError),
+    /// The sheet cannot be drawn.
+    #[error(transparent)]
+    Picture(#[from] PictureError),
+}
+
+impl Package<'_> {
+    /// Writes everything to `folder`, which is made where it is not there: `NAME.glb` for each scan, in the scan's own
+    /// space and units, `sheet.png`, `report.json`, and last `manifest.json`. Every file is written whole or not at all.
+    ///
+    /// # Errors
+    /// [`PackageError`] names the file or the scan.
+    pub fn write(&self, folder: &Path) -> Result<Report, PackageError> {
+        let start = Instant::now();
+        fs::create_dir_all(folder)
+            .map_err(|error| PackageError::Folder { path: folder.to_owned(), error })?;
+        spare_inputs(folder, self.subjects, self.inputs)?;
+        let results = self.results()?;
+        let layout = layout(&self.registration.template, self.scheme());
+        let scans = self
+            .subjects
+            .par_iter()
+            .zip(&results)
+            .map(|(subject, result)| {
+                let report = ScanReport::of(subject, result, &self.registration.template);
+                let bytes = self.glb(subject, result, &report, &layout)?;
+                write_whole(folder.join(file_of(&subject.name)), &bytes)?;
+                Ok((report, Sha256::of(&bytes)))
+            })
+            .collect::<Result<Vec<_>, PackageError>>()?;
+        write_whole(folder.join(SHEET), &comparison_sheet(self.subjects, &results).png_bytes()?)?;
+        let (scans, digests): (Vec<_>, Vec<_>) = scans.into_iter().unzip();
+        let seconds = self.seconds(start.elapsed().as_secs_f64());
+        let report = Report { record: RECORD, program: program(), seconds, scans };
+        write_json(&folder.join(REPORT), &report)?;
+        write_json(&folder.join(MANIFEST), &self.manifest(&digests))?;
+        Ok(report)
+    }
+
+    fn results(&self) -> Result<Vec<TriangleMesh>, PackageError> {
+        let Registration { template, members, .. } = self.registration;
+        let result = |(subject, positions): (&Subject, &Vec<DVec3>)| {
+            TriangleMesh::new(positions.clone(), template.triangles.clone())
+                .map_err(|error| PackageError::Result { name: subject.name.clone(), error })
+        };
+        self.subjects.iter().zip(members).map(result).collect()
+    }
+
+    fn scheme(&self) -> Option<&str> {
+        self.subjects.iter().find_map(|subject| subject.landmarks.scheme.as_deref())
+    }
+
+    fn glb(
+        &self,
+        subject: &Subject,
+        result: &TriangleMesh,
+        report: &ScanReport,
+        layout: &[DVec2],
+    ) -> Result<Vec<u8>, FormatError> {
+        let glb = Glb {
+            name: &subject.name,
+            normals: Some(&vertex_normals(result)),
+            texture_coordinates: Some(layout),
+            scalars: vec![("_RESIDUAL", &report.fidelity.residuals)],
+            extras: self.extras(result),
+            ..Glb::new(result)
+        };
+        glb_bytes(&glb).map_err(|error| error.in_file(file_of(&subject.name)))
+    }
+
+    /// The template's landmarks on a result, as landmark files have them and with their places on the triangles.
+    fn extras(&self, result: &TriangleMesh) -> Value {
+        let landmarks = self.registration.template.landmarks.iter().map(|(name, at)| {
+            let on_result = position(result, at).to_array();
+            json!({ "name": name, "position": on_result, "triangle": at.triangle.0, "weights": at.weights })
+        });
+        let landmarks: Vec<Value> = landmarks.collect();
+        match self.scheme() {
+            Some(scheme) => json!({ "scheme": scheme, "landmarks": landmarks }),
+            None => json!({ "landmarks": landmarks }),
+        }
+    }
+
+    fn seconds(&self, writing: f64) -> BTreeMap<String, f64> {
+        let stages = self.registration.seconds.iter().map(|(stage, &seconds)| (stage.to_string(), seconds));
+        let around = [("read", self.reading), ("write", writing)];
+        stages.chain(around.map(|(name, seconds)| (name.to_owned(), seconds))).collect()
+    }
+
+    fn manifest(&self, digests: &[Sha256]) -> Manifest {
+        let entry = |((subject, inputs), &output_sha256): ((&Subject, &Vec<InputFile>), &Sha256)| ScanEntry {
+            name: subject.name.clone(),
+            inputs: inputs.iter().map(|input| InputEntry::of(input, self.root)).collect(),
+            output: file_of(&subject.name),
+            output_sha256,
+        };
+        Manifest {
+            record: RECORD,
+            program: program(),
+            settings: self.settings.clone(),
+            template: TemplateEntry::of(&self.registration.template),
+            scans: self.subjects.iter().zip(self.inputs).zip(digests).map(entry).collect(),
+            report: REPORT.to_owned(),
+            sheet: SHEET.to_owned(),
+        }
+    }
+}
+
+/// Whether results can be written to `folder` and all files of the collection stay: results beside their scans might
+/// have the scans' names. Worth asking before the work as well as after it.
+///
+/// # Errors
+/// [`PackageError::Overwrites`] names the file that would not stay.
+pub fn spare_inputs(
+    folder: &Path,
+    subjects: &[Subject],
+    inputs: &[Vec<InputFile>],
+) -> Result<(), PackageError> {
+    let outputs = subjects.iter().map(|subject| file_of(&subject.name));
+    let outputs = outputs.chain([MANIFEST, REPORT, SHEET].map(str::to_owned));
+    let outputs: Vec<PathBuf> = outputs.filter_map(|name| fs::canonicalize(folder.join(name)).ok()).collect();
+    let is_output = |input: &&InputFile| fs::canonicalize(&input.path).is_ok_and(|at| outputs.contains(&at));
+    match inputs.iter().flatten().find(is_output) {
+        Some(input) => Err(PackageError::Overwrites { path: input.path.clone() }),
+        None => Ok(()),
+    }
+}
+
+fn program() -> String {
+    format!("onemesh {}", env!("CARGO_PKG_VERSION"))
+}
+
+fn file_of(name: &str) -> String {
+    format!("{name}.glb")
+}
+
+fn write_json(path: &Path, record: &impl serde::Serialize) -> Result<(), FormatError> {
+    let mut text = serde_json::to_string_pretty(record).expect("records are plain numbers and names");
+    text.push('\n');
+    write_whole(path, text.as_bytes())
+}
+
+/// Area-weighted vertex normals `[N, 3]`, not of unit length.
+pub fn vertex_normals(mesh: &TriangleMesh) -> Vec<DVec3> {
+    let mut normals = vec![DVec3::ZERO; mesh.positions().len()];
+    for corners in mesh.triangles() {
+        let [a, b, c] = corners.map(|i| mesh.positions()[i as usize]);
+        let normal = (b - a).cross(c - a);
+        corners.iter().for_each(|&i| normals[i as usize] += normal);
+    }
+    normals
+}
+
+/// Texture coordinates `[N, 2]` of a template: its landmarks say where the face is and, in a known scheme, which way is
+/// up; the sphere's +Z and +Y do where they do not.
+pub fn layout(template: &Template, scheme: Option<&str>) -> Vec<DVec2> {
+    let topology = Topology::new(template.sphere.len(), &template.triangles);
+    let on_sphere = |at: &crate::mesh::SurfacePoint| -> DVec3 {
+        let corners = template.triangles[at.triangle.0 as usize];
+        corners.iter().zip(at.weights).map(|(&i, weight)| template.sphere[i as usize] * weight).sum()
+    };
+    let (names, points): (Vec<_>, Vec<_>) =
+        template.landmarks.iter().map(|(name, at)| (name.clone(), Some(on_sphere(at)))).unzip();
+    let face = points.iter().flatten().sum::<DVec3>();
+    let landmarks = LandmarkSet { scheme: None, names, points };
+    let up = scheme.and_then(Scheme::named).and_then(|scheme| upwards(scheme, &landmarks));
+    sphere_layout(&topology, &template.sphere, face, up.unwrap_or(DVec3::Y))
+}
+
+/// From the lips to the eyes.
+fn upwards(scheme: &Scheme, landmarks: &LandmarkSet) -> Option<DVec3> {
+    let centre = |region| scheme.centre(region, landmarks);
+    let eyes = centre(Region::RightEye)? + centre(Region::LeftEye)?;
+    Some(eyes / 2.0 - centre(Region::OuterLips)?)
+}

@@ -1,0 +1,202 @@
+//! The built program, as people meet it.
+
+mod common;
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+
+use common::{QUICK, command, quick_register, write_collection};
+use onemesh::formats::{Sha256, read_landmarks, read_mesh, write_landmarks};
+use serde_json::Value;
+
+/// Runs the program.
+fn onemesh<S: AsRef<std::ffi::OsStr>>(arguments: impl IntoIterator<Item = S>) -> Output {
+    command().args(arguments).output().unwrap()
+}
+
+fn succeeded(output: &Output) -> String {
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{said}");
+    String::from_utf8_lossy(&output.stdout).into_owned()
+}
+
+/// What the program complains of; it must not panic.
+fn complaint(output: &Output) -> String {
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(!output.status.success(), "succeeded: {said}");
+    assert!(!said.contains("panicked"), "{said}");
+    assert!(said.contains("error: "), "{said}");
+    said
+}
+
+fn json(path: impl AsRef<Path>) -> Value {
+    serde_json::from_slice(&fs::read(path).unwrap()).unwrap()
+}
+
+/// The JSON of a GLB.
+fn glb_json(path: &Path) -> Value {
+    let bytes = fs::read(path).unwrap();
+    let length = u32::from_le_bytes(*bytes[12..].first_chunk().unwrap()) as usize;
+    serde_json::from_slice(&bytes[20..20 + length]).unwrap()
+}
+
+#[test]
+fn a_collection_is_registered() {
+    let folder = tempfile::tempdir().unwrap();
+    let (scans, out) = (folder.path().join("scans"), folder.path().join("out"));
+    let names = write_collection(&scans, 3);
+    let said = succeeded(&onemesh(quick_register(&scans, &out)));
+    assert!(said.contains("sheet.png") && names.iter().all(|name| said.contains(name)), "{said}");
+
+    let (manifest, report) = (json(out.join("manifest.json")), json(out.join("report.json")));
+    let shared = read_mesh(out.join(format!("{}.glb", names[0]))).unwrap();
+    for (at, name) in names.iter().enumerate() {
+        let path = out.join(format!("{name}.glb"));
+        assert_eq!(read_mesh(&path).unwrap().triangles(), shared.triangles(), "{name}");
+        holds_to_its_scan(&glb_json(&path));
+        let entry = &manifest["scans"][at];
+        assert_eq!(entry["name"], **name);
+        assert_eq!(entry["inputs"][0]["file"], format!("{name}/scan.ply"));
+        let digest = |path: &Path| Sha256::of(&fs::read(path).unwrap()).to_string();
+        assert_eq!(entry["inputs"][0]["sha256"], digest(&scans.join(name).join("scan.ply")));
+        assert_eq!(entry["output_sha256"], digest(&path));
+        let scan = &report["scans"][at];
+        assert!(scan["scan_to_mesh"]["p50"].as_f64().unwrap() < 2.0, "{scan}");
+        assert_eq!(scan["landmarks"].as_object().unwrap().len(), 68);
+        assert!(scan["flipped"].is_number() && scan["sliver"].is_number() && scan["normal"].is_number());
+    }
+    assert_eq!(manifest["settings"]["groupwise"]["rounds"], 1);
+    assert_eq!(manifest["template"]["vertices"], 642);
+    assert!(report["seconds"]["register"].is_number() && report["seconds"]["write"].is_number());
+    assert!(fs::read(out.join("sheet.png")).unwrap().starts_with(b"\x89PNG"));
+    let unfinished = fs::read_dir(&out)
+        .unwrap()
+        .filter(|file| file.as_ref().unwrap().file_name().to_string_lossy().ends_with(".part"));
+    assert_eq!(unfinished.count(), 0);
+    validate(&out.join(format!("{}.glb", names[0])));
+
+    // The manifest's settings make the same again, and its triangles can be measured.
+    let again = folder.path().join("again");
+    let manifest_file = out.join("manifest.json");
+    let arguments =
+        [Path::new("register"), &scans, Path::new("-o"), &again, Path::new("--settings"), &manifest_file];
+    succeeded(&onemesh(arguments));
+    assert_eq!(fs::read(&manifest_file).unwrap(), fs::read(again.join("manifest.json")).unwrap());
+}
+
+fn holds_to_its_scan(document: &Value) {
+    let attributes = document["meshes"][0]["primitives"][0]["attributes"].as_object().unwrap();
+    let mut names: Vec<&str> = attributes.keys().map(String::as_str).collect();
+    names.sort_unstable();
+    assert_eq!(names, ["NORMAL", "POSITION", "TEXCOORD_0", "_RESIDUAL"]);
+    let extras = &document["scenes"][0]["extras"];
+    assert_eq!(extras["scheme"], "multipie68");
+    assert_eq!(extras["landmarks"].as_array().unwrap().len(), 68);
+}
+
+fn validate(path: &Path) {
+    let scripts = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/gltf_validator");
+    if !scripts.join("node_modules/gltf-validator").exists() {
+        assert!(std::env::var_os("ONEMESH_REQUIRE_GLTF_VALIDATOR").is_none(), "gltf-validator is not there");
+        return;
+    }
+    if let Ok(output) = Command::new("node").arg(scripts.join("validate.mjs")).arg(path).output() {
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stdout));
+    }
+}
+
+#[test]
+fn one_scan_is_fitted_and_measured() {
+    let folder = tempfile::tempdir().unwrap();
+    let name = write_collection(folder.path(), 1).remove(0);
+    let (scan, mesh) = (folder.path().join(name).join("scan.ply"), folder.path().join("fit.glb"));
+    let quick = ["--vertices", "642", "--set", "fit.levels.0.iterations=30"].map(Path::new);
+    let arguments = [Path::new("fit"), &scan, Path::new("-o"), &mesh];
+    let printed: Value = serde_json::from_str(&succeeded(&onemesh(arguments.iter().chain(&quick)))).unwrap();
+    assert_eq!(printed["vertices"], 642);
+    validate(&mesh);
+    let said = succeeded(&onemesh([Path::new("evaluate"), &scan, &mesh]));
+    let measured: Value = serde_json::from_str(&said).unwrap();
+    let chamfer = measured["meshes"][mesh.to_str().unwrap()]["chamfer"].as_f64().unwrap();
+    // The file holds single precision.
+    assert!((chamfer / printed["chamfer"].as_f64().unwrap() - 1.0).abs() < 1e-3);
+    assert_eq!(measured["mean_chamfer"].as_f64().unwrap(), chamfer);
+    let odd = complaint(&onemesh([Path::new("evaluate"), &scan]));
+    assert!(odd.contains("scan.ply") && odd.contains("without a mesh"), "{odd}");
+}
+
+#[test]
+fn a_demo_is_sculpted_registered_and_measured() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut arguments = vec!["demo", "--count", "2", "-o", folder.path().to_str().unwrap()];
+    arguments.extend(QUICK);
+    let said = succeeded(&onemesh(arguments));
+    assert!(said.contains(" mm on average"), "{said}");
+    let [scans, results] = ["scans", "result"].map(|name| folder.path().join(name));
+    let pair = |name: &str| format!("{name}={}", results.join(format!("{name}.glb")).display());
+    let (first, second) = (pair("head-00"), pair("head-01"));
+    let arguments = ["evaluate", "correspondence", scans.to_str().unwrap(), &first, &second];
+    let figures: Value = serde_json::from_str(&succeeded(&onemesh(arguments))).unwrap();
+    assert_eq!(figures["identical_triangles"], true);
+    assert!(said.contains(&format!("{:.2} mm on average", figures["mean_mm"].as_f64().unwrap())), "{said}");
+}
+
+#[test]
+fn what_cannot_be_registered_is_said_clearly() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let scans = folder.path().join("scans");
+    let register = || complaint(&onemesh(quick_register(&scans, &out)));
+
+    assert!(register().contains("scans"), "a folder that is not there");
+    fs::create_dir(&scans).unwrap();
+    assert!(register().contains("holds no scan"));
+
+    let names = write_collection(&scans, 2);
+    let landmarks = scans.join(&names[1]).join("landmarks.json");
+    let mut few = read_landmarks(&landmarks).unwrap();
+    (3..68).for_each(|at| few.points[at] = None);
+    few.points[2] = None;
+    write_landmarks(&landmarks, &few).unwrap();
+    let said = register();
+    assert!(said.contains("only 2 landmarks") && said.contains("scans"), "{said}");
+    fs::write(&landmarks, "[[1, 2]]").unwrap();
+    let said = register();
+    assert!(said.contains("landmarks.json") && said.contains(&names[1]), "{said}");
+    fs::remove_file(&landmarks).unwrap();
+    assert!(register().contains("has no landmarks"));
+
+    fs::remove_dir_all(scans.join(&names[1])).unwrap();
+    fs::write(scans.join(&names[0]).join("scan.ply"), "ply\nformat ascii 1.0\nelement vertex 9").unwrap();
+    let said = register();
+    assert!(said.contains("scan.ply") && said.contains(&names[0]), "{said}");
+    assert!(!out.exists(), "nothing is written");
+}
+
+#[test]
+fn wrong_parameters_are_said_clearly() {
+    let said =
+        |more: &[&str]| complaint(&onemesh(["register", "nowhere", "-o", "nowhere"].iter().chain(more)));
+    assert!(said(&["--vertices", "1000"]).contains("10242"));
+    assert!(said(&["--set", "groupwise.round=2"]).contains("rounds"));
+    assert!(said(&["--set", "groupwise.rounds"]).contains("NAME=VALUE"));
+    assert!(said(&["--threads", "0"]).contains("--threads 0"));
+    assert!(said(&["--settings", "no-such-file.json"]).contains("no-such-file.json"));
+}
+
+#[test]
+fn scans_are_not_overwritten_by_results() {
+    let folder = tempfile::tempdir().unwrap();
+    let name = write_collection(folder.path(), 1).remove(0);
+    let own = folder.path().join(&name);
+    let glb = folder.path().join(format!("{name}.glb"));
+    let mesh = read_mesh(own.join("scan.ply")).unwrap();
+    onemesh::formats::write_glb(&glb, &onemesh::formats::Glb::new(&mesh)).unwrap();
+    fs::rename(own.join("landmarks.json"), folder.path().join(format!("{name}.landmarks.json"))).unwrap();
+    fs::remove_dir_all(own).unwrap();
+    let before = fs::read(&glb).unwrap();
+    let said = complaint(&onemesh(quick_register(folder.path(), folder.path())));
+    assert!(said.contains("would be overwritten"), "{said}");
+    assert_eq!(fs::read(&glb).unwrap(), before);
+}
