@@ -101,11 +101,9 @@ fn rim_sides(topology: &Topology) -> Vec<[bool; 3]> {
     let mut sides = vec![[false; 3]; topology.triangles.len()];
     for (&[a, b], &[left, right]) in topology.edges.iter().zip(&topology.edge_triangles) {
         if left == right {
-            for k in 0..3 {
-                let corner = topology.triangles[left as usize][k];
-                if corner != a && corner != b {
-                    sides[left as usize][k] = true;
-                }
+            let t = left as usize;
+            for (side, corner) in sides[t].iter_mut().zip(topology.triangles[t]) {
+                *side |= corner != a && corner != b;
             }
         }
     }

@@ -130,19 +130,17 @@ mod tests {
 
     #[test]
     fn any_affine_deformation_is_free_of_force() {
-        let sphere = Sphere::of_level(2);
+        let sphere = Sphere::of_level(4);
         let rest = RestShape::new(sphere.clone(), sphere.rest.clone());
         let affine = Mat3A::from_axis_angle(Vec3::Y, 0.8) * Mat3A::from_diagonal(Vec3::new(2.0, 0.7, 1.1));
         let p: Vec<Vec3A> = sphere.rest.iter().map(|m| affine * *m + Vec3A::X).collect();
         let gradients = rest.gradients(&p, &smoother(&sphere), &mut SolveBuffer::default());
         let mut force = vec![Vec3A::ZERO; p.len()];
         rest.add_force(&p, &gradients, 1.0, &mut force);
-        // The normal's stretch is a convention, so only the surface's own directions are exact.
-        assert!(
-            force.iter().all(|f| f.length() < 0.05),
-            "{:?}",
-            force.iter().map(|f| f.length()).fold(0.0, f32::max)
-        );
+        // The normal's stretch is a convention, so only the surface's own directions are exact: what is left falls with
+        // the square of the edges' length.
+        let largest = force.iter().map(|f| f.length()).fold(0.0, f32::max);
+        assert!(largest < 0.004, "{largest}");
     }
 
     #[test]
