@@ -181,10 +181,16 @@ impl Run<'_> {
     }
 
     fn prepare<'s>(&self, subjects: &'s [Subject]) -> Vec<Prepared<'s>> {
+        let landmarks = |subject: &Subject| -> Vec<DVec3> {
+            self.names.iter().filter_map(|name| subject.landmarks.get(name)).collect()
+        };
+        let Some(first) = subjects.first().map(landmarks) else { return Vec::new() };
+        let equal = vec![1.0; first.len()];
         let prepare = |subject: &'s Subject| {
-            let scan = ScanSurface::new(&subject.mesh, SAMPLES);
-            let landmarks = self.names.iter().filter_map(|name| subject.landmarks.get(name));
-            let landmarks = landmarks.map(|p| scan.to_unit(p)).collect();
+            let own = landmarks(subject);
+            let rotation = Similarity::between(&own, &first, &equal).rotation;
+            let scan = ScanSurface::turned(&subject.mesh, rotation, SAMPLES);
+            let landmarks = own.iter().map(|&p| scan.to_unit(p)).collect();
             Prepared { name: &subject.name, scan, landmarks }
         };
         subjects.par_iter().map(prepare).collect()

@@ -1,4 +1,4 @@
-use glam::{DVec3, Vec3A};
+use glam::{DMat3, DVec3, Vec3A};
 
 use crate::mesh::{Normals, Topology, TriangleMesh};
 use crate::numeric::Random;
@@ -13,13 +13,15 @@ pub struct SurfaceSample {
     pub normal: Vec3A,
 }
 
-/// A scan made ready to be fitted: in unit space (its vertices' mean at the origin, the farthest at distance one), with
-/// an index of its triangles, its rim and samples of its surface.
+/// A scan made ready to be fitted: in unit space (its vertices' mean at the origin, the farthest at distance one, and
+/// perhaps turned), with an index of its triangles, its rim and samples of its surface.
 pub struct ScanSurface {
     /// The vertices' mean, in the scan's own space.
     pub centre: DVec3,
     /// The largest distance of a vertex from it, in the scan's units.
     pub radius: f64,
+    /// How it is turned from its own space to unit space.
+    pub rotation: DMat3,
     /// Nearest points, in unit space.
     pub index: SurfaceIndex,
     /// Evenly spread samples in random order, so that any stretch of them covers the surface.
@@ -32,18 +34,24 @@ pub struct ScanSurface {
 }
 
 impl ScanSurface {
-    /// Prepares a scan, with this many samples.
+    /// Prepares a scan as it lies in its own space, with this many samples.
     pub fn new(mesh: &TriangleMesh, samples: usize) -> Self {
+        Self::turned(mesh, DMat3::IDENTITY, samples)
+    }
+
+    /// Prepares a scan and turns it.
+    pub fn turned(mesh: &TriangleMesh, rotation: DMat3, samples: usize) -> Self {
         let centre = mesh.centroid();
         let radius = mesh.radius_about(centre);
         let positions: Vec<Vec3A> =
-            mesh.positions().iter().map(|p| ((*p - centre) / radius).as_vec3a()).collect();
+            mesh.positions().iter().map(|p| (rotation * (*p - centre) / radius).as_vec3a()).collect();
         let topology = Topology::of(mesh);
         let normals = Normals::new(&topology, &positions);
         let samples = sample(mesh.triangles(), &positions, &normals, samples);
         Self {
             centre,
             radius,
+            rotation,
             index: SurfaceIndex::new(&positions, mesh.triangles()),
             samples,
             normals: normals.vertices,
@@ -54,12 +62,12 @@ impl ScanSurface {
 
     /// From the scan's space to unit space.
     pub fn to_unit(&self, point: DVec3) -> Vec3A {
-        ((point - self.centre) / self.radius).as_vec3a()
+        (self.rotation * (point - self.centre) / self.radius).as_vec3a()
     }
 
     /// From unit space to the scan's.
     pub fn to_scan(&self, point: Vec3A) -> DVec3 {
-        point.as_dvec3() * self.radius + self.centre
+        self.rotation.transpose() * point.as_dvec3() * self.radius + self.centre
     }
 
     /// Sample number `k`, counted round.
