@@ -32,7 +32,7 @@ impl Settings {
                 vertices,
                 fit: coarse_to_fine(level.min(4)),
                 resample,
-                register: coarse_to_fine(level),
+                register: coarse_to_fine(level.min(4)),
                 groupwise: groupwise(),
             },
         })
@@ -44,7 +44,11 @@ impl Settings {
     /// As [`Settings::preset`].
     pub fn for_fit(preset: Preset, vertices: usize) -> Result<Self, SettingError> {
         let settings = Self::preset(preset, vertices)?;
-        Ok(Self { fit: settings.register.clone(), ..settings })
+        let fit = match preset {
+            Preset::Default => coarse_to_fine(Icosphere::level_of(vertices).unwrap_or(COARSEST)),
+            Preset::Paper => settings.fit,
+        };
+        Ok(Self { fit, ..settings })
     }
 
     /// The same without density adaptation: diffusion re-parameterization alone.
@@ -117,7 +121,7 @@ fn groupwise() -> GroupwiseSettings {
         normal_search: [0.1, 0.02],
         reach: [0.3, 0.03],
         least_cosine: 0.0,
-        samples: 30_000,
+        samples: 20_000,
         sample_reach: 1.0,
         sample_least_cosine: -0.3,
         slack: 0.005,

@@ -1,23 +1,22 @@
 //! All stages over a collection.
 
 use std::collections::BTreeMap;
-use std::sync::Arc;
 use std::time::Instant;
 
 use glam::{DVec3, Vec3A};
 use rayon::prelude::*;
 
 use super::fit::{SphereLandmark, fit};
-use super::groupwise::{Member, RestShape, mean_shape, redistribute, register_member};
+use super::groupwise::{Member, RestShape, SharedMesh, mean_shape, register_member};
 use super::observer::{Canceled, Observer, Stage, Watch};
 use super::resample;
 use super::scan_surface::ScanSurface;
 use super::settings::{FitSettings, Settings};
 use super::sphere::Sphere;
 use crate::energy::LandmarkPull;
-use crate::mesh::{LandmarkSet, SurfacePoint, TriangleId, TriangleMesh};
+use crate::mesh::{Icosphere, LandmarkSet, SurfacePoint, TriangleMesh};
 use crate::numeric::Similarity;
-use crate::spatial::{Hit, SurfaceIndex};
+use crate::spatial::SurfaceIndex;
 
 /// Samples of a scan that fits draw from.
 const SAMPLES: usize = 120_000;
@@ -116,17 +115,16 @@ pub fn register(
     let members = run.timed(Stage::Prepare, |run| run.prepare(subjects));
     let fits = run.timed(Stage::Fit, |run| run.fit_all(Stage::Fit, &members, &run.settings.fit, &[]))?;
     let on_sphere = run.timed(Stage::Resample, |run| run.resample(&members, &fits));
-    let mut shapes = run.timed(Stage::Register, |run| {
+    let shapes = run.timed(Stage::Register, |run| {
         run.fit_all(Stage::Register, &members, &run.settings.register, &on_sphere)
     })?;
     let sphere = Sphere::of_level(last_level(&settings.register));
-    let mut points = sphere.surface_points(on_sphere.iter().copied());
-    let mut mean = None;
+    let points = sphere.surface_points(on_sphere.iter().copied());
+    let mut shared = SharedMesh { sphere, points, shapes, mean: Vec::new() };
     if settings.groupwise.rounds > 0 {
-        let (refined, shape) =
-            run.timed(Stage::Groupwise, |run| run.groupwise(&sphere, &members, &mut points, shapes))?;
-        (shapes, mean) = (refined, Some(shape));
+        shared = run.timed(Stage::Groupwise, |run| run.groupwise(&members, shared))?;
     }
+    let SharedMesh { sphere, points, shapes, mean } = shared;
     let back =
         |(member, shape): (&Prepared, &Vec<Vec3A>)| shape.iter().map(|p| member.scan.to_scan(*p)).collect();
     Ok(Registration {
@@ -134,7 +132,7 @@ pub fn register(
             sphere: sphere.rest.iter().map(|p| p.as_dvec3()).collect(),
             triangles: sphere.topology.triangles.clone(),
             landmarks: run.names.iter().cloned().zip(points).collect(),
-            mean,
+            mean: (!mean.is_empty()).then_some(mean),
         },
         members: members.iter().zip(&shapes).map(back).collect(),
         seconds: run.seconds,
@@ -238,26 +236,19 @@ impl Run<'_> {
         self.names.iter().map(weight).collect()
     }
 
-    /// Rounds of taking the mean and registering it to every member; returns the shapes and the last mean.
-    fn groupwise(
-        &self,
-        sphere: &Arc<Sphere>,
-        members: &[Prepared],
-        points: &mut Vec<SurfacePoint>,
-        mut shapes: Vec<Vec<Vec3A>>,
-    ) -> Result<(Vec<Vec<Vec3A>>, Vec<Vec3A>), Canceled> {
+    /// Rounds of taking the mean and registering it to every member; the last is on the template's own level.
+    fn groupwise(&self, members: &[Prepared], mut shared: SharedMesh) -> Result<SharedMesh, Canceled> {
         let settings = &self.settings.groupwise;
         let per_round = settings.phases * settings.iterations;
-        let mut mean = Vec::new();
         for round in 0..settings.rounds {
-            mean = mean_shape(&shapes, &trust(sphere, members, &shapes));
-            if round > 0 {
-                let moved = redistribute(sphere, &mean, &shapes, settings);
-                *points = relocate(sphere, points, &moved);
-                mean = carried(sphere, &mean, &moved);
-                shapes = shapes.iter().map(|shape| carried(sphere, shape, &moved)).collect();
+            if round + 1 == settings.rounds {
+                shared.refine_to(Icosphere::level_of(self.settings.vertices).unwrap_or(0));
             }
-            let rest = RestShape::new(sphere.clone(), mean.clone());
+            shared.mean = mean_shape(&shared.shapes, &trust(&shared.sphere, members, &shared.shapes));
+            if round > 0 {
+                shared.redistribute(settings);
+            }
+            let rest = RestShape::new(shared.sphere.clone(), shared.mean.clone());
             let one = |(member, shape): (&Prepared, &Vec<Vec3A>)| {
                 let watch = Watch {
                     observer: self.observer,
@@ -265,38 +256,15 @@ impl Run<'_> {
                     scan: member.name,
                     iterations: per_round * settings.rounds,
                 };
-                let pulls = pulls(points, &member.landmarks);
+                let pulls = pulls(&shared.points, &member.landmarks);
                 let start = moved_onto(&rest.positions, shape);
                 let member = Member { scan: &member.scan, landmarks: &pulls, start };
                 register_member(&rest, member, settings, &watch, round * per_round)
             };
-            shapes = members.par_iter().zip(&shapes).map(one).collect::<Result<_, _>>()?;
+            shared.shapes = members.par_iter().zip(&shared.shapes).map(one).collect::<Result<_, _>>()?;
         }
-        Ok((shapes, mean))
+        Ok(shared)
     }
-}
-
-/// Values on the old sphere `[N, 3]` at the points that its vertices moved to.
-fn carried(sphere: &Sphere, values: &[Vec3A], moved: &[Hit]) -> Vec<Vec3A> {
-    let at = |hit: &Hit| {
-        let corners = sphere.topology.triangles[hit.triangle as usize];
-        corners.iter().zip(hit.weights).map(|(&i, w)| values[i as usize] * w).sum()
-    };
-    moved.iter().map(at).collect()
-}
-
-/// The same points of the sphere on its moved triangles.
-fn relocate(sphere: &Sphere, points: &[SurfacePoint], moved: &[Hit]) -> Vec<SurfacePoint> {
-    let vertices: Vec<Vec3A> = moved.iter().map(|hit| hit.point).collect();
-    let index = SurfaceIndex::new(&vertices, &sphere.topology.triangles);
-    let relocate = |point: &SurfacePoint| {
-        let corners = sphere.topology.triangles[point.triangle.0 as usize];
-        let position: Vec3A =
-            corners.iter().zip(point.weights).map(|(&i, w)| sphere.rest[i as usize] * w as f32).sum();
-        let hit = index.closest(position);
-        SurfacePoint { triangle: TriangleId(hit.triangle), weights: hit.weights.map(f64::from) }
-    };
-    points.iter().map(relocate).collect()
 }
 
 fn pulls(points: &[SurfacePoint], targets: &[Vec3A]) -> Vec<LandmarkPull> {

@@ -61,8 +61,10 @@ impl Settings {
         check_numbers(&document(self), "")?;
         check_levels("fit", &self.fit)?;
         check_levels("register", &self.register)?;
-        let finest = self.register.levels.last().map(|level| level.level);
-        if finest != Icosphere::level_of(self.vertices) {
+        let (last, own) =
+            (self.register.levels.last().map(|level| level.level), Icosphere::level_of(self.vertices));
+        // Only the groupwise stage can go on from a coarser level.
+        if last > own || own.is_none() || (last < own && self.groupwise.rounds == 0) {
             return Err(SettingError::Levels {
                 stage: "register",
                 problem: format!("must end at the level of {} vertices", self.vertices),

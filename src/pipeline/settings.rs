@@ -105,7 +105,8 @@ pub struct ResampleSettings {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct GroupwiseSettings {
-    /// How often a mean is taken and registered to every scan.
+    /// How often a mean is taken and registered to every scan: the last time on the template's own level, before that
+    /// on the last one of `register`, which may be coarser.
     pub rounds: usize,
     /// Exponent of curvature in the vertex density of the shared template; zero leaves it even.
     pub curvature_power: f32,

@@ -117,6 +117,14 @@ impl Sphere {
             .clone()
     }
 
+    /// The positions on the sphere of surface points.
+    pub fn directions(&self, points: &[SurfacePoint]) -> impl Iterator<Item = DVec3> {
+        points.iter().map(|point| {
+            let corners = self.topology.triangles[point.triangle.0 as usize];
+            corners.iter().zip(point.weights).map(|(&i, w)| self.rest[i as usize].as_dvec3() * w).sum()
+        })
+    }
+
     /// The surface points of the sphere nearest to directions.
     pub fn surface_points(&self, directions: impl IntoIterator<Item = DVec3>) -> Vec<SurfacePoint> {
         let mut directions = directions.into_iter().peekable();

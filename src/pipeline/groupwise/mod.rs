@@ -9,8 +9,10 @@ mod mean;
 mod member;
 mod redistribution;
 mod rest_shape;
+mod shared_mesh;
 
 pub use mean::mean_shape;
 pub use member::{Member, register_member};
 pub use redistribution::redistribute;
 pub use rest_shape::RestShape;
+pub use shared_mesh::SharedMesh;
