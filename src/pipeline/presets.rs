@@ -30,9 +30,9 @@ impl Settings {
             Preset::Default => Self {
                 preset,
                 vertices,
-                fit: coarse_to_fine(level.min(4)),
+                fit: coarse_to_fine(level.min(4), 120),
                 resample,
-                register: coarse_to_fine(level.min(4)),
+                register: coarse_to_fine(level.min(4), 150),
                 groupwise: groupwise(),
             },
         })
@@ -45,7 +45,7 @@ impl Settings {
     pub fn for_fit(preset: Preset, vertices: usize) -> Result<Self, SettingError> {
         let settings = Self::preset(preset, vertices)?;
         let fit = match preset {
-            Preset::Default => coarse_to_fine(Icosphere::level_of(vertices).unwrap_or(COARSEST)),
+            Preset::Default => coarse_to_fine(Icosphere::level_of(vertices).unwrap_or(COARSEST), 200),
             Preset::Paper => settings.fit,
         };
         Ok(Self { fit, ..settings })
@@ -82,21 +82,21 @@ fn paper(level: u32) -> FitSettings {
     }
 }
 
-fn coarse_to_fine(finest: u32) -> FitSettings {
-    FitSettings { start_radius: 0.9, levels: (COARSEST..=finest).map(level).collect() }
+fn coarse_to_fine(finest: u32, iterations: usize) -> FitSettings {
+    FitSettings { start_radius: 0.9, levels: (COARSEST..=finest).map(|k| level(k, iterations)).collect() }
 }
 
-fn level(level: u32) -> LevelSettings {
+fn level(level: u32, iterations: usize) -> LevelSettings {
     let depth = level - COARSEST;
     let shrink = 0.6f32.powi(depth as i32);
     let lambda = [4.0, 6.0, 10.0, 16.0][depth as usize];
     LevelSettings {
         level,
-        iterations: if depth < 2 { 200 } else { 250 },
+        iterations,
         lambda,
         rate: 0.4 * 0.5f32.powi(depth as i32),
         rate_end: 0.05,
-        refresh: 2,
+        refresh: if depth < 2 { 2 } else { 4 },
         samples: (4 * (10 * 4usize.pow(level) + 2)).min(30_000),
         normal_weight: [0.06, 0.3],
         normal_search: [0.15 * shrink, 0.045 * shrink],

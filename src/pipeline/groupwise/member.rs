@@ -94,6 +94,7 @@ struct Phase {
     reach: f32,
     sample_reach: f32,
     least_cosine: f32,
+    samples: usize,
 }
 
 impl<'a> Registration<'a> {
@@ -131,6 +132,8 @@ impl<'a> Registration<'a> {
             reach: if entering { f32::INFINITY } else { ramp(settings.reach) },
             sample_reach: if entering { settings.sample_reach } else { ramp(settings.reach) },
             // Once it enters, every vertex is held by the scan, whichever way it looks: none is left to stick out.
+            // Stiff, the shape has few ways to move and few samples show them all.
+            samples: if entering { settings.samples } else { settings.samples / 4 },
             least_cosine: if entering { -1.0 } else { settings.least_cosine },
         };
         self.smoother = Some(self.rest.sphere.diffusion(geometric(settings.smoothing, x)));
@@ -237,8 +240,8 @@ impl<'a> Registration<'a> {
             let weight = (FAR / hit.distance_squared.sqrt().max(FAR)).min(1.0) * per_sample;
             Some(SampleHit { sample, hit, weight })
         };
-        self.samples_taken += settings.samples;
-        (0..settings.samples).into_par_iter().with_min_len(128).map(closest).collect()
+        self.samples_taken += self.phase.samples;
+        (0..self.phase.samples).into_par_iter().with_min_len(128).map(closest).collect()
     }
 
     /// Pull of each matched vertex to its closest point, mostly along the scan's normal.
@@ -256,7 +259,7 @@ impl<'a> Registration<'a> {
 
     /// One sample weighs as many vertices as there are to a sample.
     fn sample_weight(&self) -> f32 {
-        self.p.len() as f32 / self.settings.samples.max(1) as f32
+        self.p.len() as f32 / self.phase.samples.max(1) as f32
     }
 
     fn add_sample_forces(&self, matches: &[Option<SampleHit>], force: &mut [Vec3A]) -> f64 {
