@@ -20,8 +20,8 @@ const INERTIA: f64 = 0.1;
 /// Matches farther than this pull towards the sample itself; nearer ones more and more only along its normal.
 const FAR: f32 = 0.03;
 
-/// Share of the phases after which the template enters what far samples show it, an open mouth: by then the rest of it
-/// lies on the scan and no longer follows them.
+/// Share of the phases after which far samples no longer lead: the template lies on the scan, follows what is near, and
+/// every vertex is held by some point of it.
 const ENTER: f64 = 0.65;
 
 /// One scan of the collection, and where its registration begins.
