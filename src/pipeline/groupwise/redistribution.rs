@@ -40,17 +40,6 @@ pub fn redistribute(
         psi.iter_mut().for_each(|r| *r = 1.5 * FLOW_LAMBDA as f32 * (*r - average));
         solver.solve_scalar(&mut psi, &mut buffer);
         x = flow(topology, &x, &psi);
-        #[cfg(test)]
-        {
-            let e: f32 = areas
-                .iter()
-                .zip(&needed)
-                .map(|(a, n)| (a * n).max(1e-20).ln())
-                .map(|r| (r - average).powi(2))
-                .sum::<f32>()
-                / psi.len() as f32;
-            println!("{e}");
-        }
     }
     locate(&index, &x)
 }
