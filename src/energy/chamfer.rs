@@ -1,6 +1,7 @@
 use glam::Vec3A;
 
 use super::{Gradient, Shape};
+use crate::mesh::interpolate;
 
 /// How a distance r pulls.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -90,9 +91,7 @@ impl ScanToTemplate<'_> {
         let mut sum = 0.0;
         for matched in self.matches.iter().filter(|matched| matched.weight > 0.0) {
             let corners = shape.topology.triangles[matched.triangle as usize];
-            let on_template: Vec3A =
-                corners.iter().zip(matched.weights).map(|(&i, w)| shape.positions[i as usize] * w).sum();
-            let difference = on_template - matched.point;
+            let difference = interpolate(shape.positions, corners, matched.weights) - matched.point;
             let (value, factor) = self.pull.at(difference.length());
             sum += f64::from(matched.weight * value);
             let force = difference * (factor * scale * matched.weight);

@@ -1,6 +1,7 @@
 use glam::Vec3A;
 
 use super::{Gradient, Shape};
+use crate::mesh::{SurfacePoint, interpolate};
 
 /// A landmark: a point of the template, and where it belongs on the scan.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -13,6 +14,13 @@ pub struct LandmarkPull {
     pub target: Vec3A,
     /// Weight of this landmark.
     pub weight: f32,
+}
+
+impl LandmarkPull {
+    /// A point of the template that belongs at `target`, with weight one.
+    pub fn new(point: &SurfacePoint, target: Vec3A) -> Self {
+        Self { triangle: point.triangle.0, weights: point.weights.map(|w| w as f32), target, weight: 1.0 }
+    }
 }
 
 /// The landmark term: 1/B sum_i w_i |c_i - k_i|^2.
@@ -28,9 +36,7 @@ impl Landmarks<'_> {
         let mut sum = 0.0;
         for pull in self.pulls {
             let corners = shape.topology.triangles[pull.triangle as usize];
-            let on_template: Vec3A =
-                corners.iter().zip(pull.weights).map(|(&i, w)| shape.positions[i as usize] * w).sum();
-            let difference = on_template - pull.target;
+            let difference = interpolate(shape.positions, corners, pull.weights) - pull.target;
             sum += f64::from(pull.weight * difference.length_squared());
             for (&i, w) in corners.iter().zip(pull.weights) {
                 gradient.positions[i as usize] += difference * (2.0 * weight * pull.weight * w / count);

@@ -11,6 +11,15 @@ pub struct SurfacePoint {
     pub weights: [f64; 3],
 }
 
+/// The value at a point of a triangle: the mean of its corners' `values` with barycentric `weights`.
+#[inline]
+pub fn interpolate<T>(values: &[T], corners: [u32; 3], weights: [f32; 3]) -> T
+where
+    T: Copy + std::ops::Mul<f32, Output = T> + std::iter::Sum,
+{
+    corners.iter().zip(weights).map(|(&i, w)| values[i as usize] * w).sum()
+}
+
 /// Named landmark positions `[B, 3]` on one scan, in its own space; a missing landmark is `None`.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct LandmarkSet {

@@ -10,7 +10,7 @@ mod triangle_mesh;
 
 pub use edge_length::{mean_edge_lengths, pull_back_mean_edge_lengths};
 pub use icosphere::{Icosphere, Midpoints};
-pub use landmark::{LandmarkSet, SurfacePoint};
+pub use landmark::{LandmarkSet, SurfacePoint, interpolate};
 pub use normals::{Normals, pull_back_area_vectors};
 pub use sphere_layout::sphere_layout;
 pub use topology::{Rows, Topology};

@@ -64,13 +64,7 @@ pub fn fit(
 
 fn landmark_pulls(sphere: &Sphere, landmarks: &[SphereLandmark]) -> Vec<LandmarkPull> {
     let points: Vec<SurfacePoint> = sphere.surface_points(landmarks.iter().map(|l| l.on_sphere));
-    let pull = |(point, landmark): (SurfacePoint, &SphereLandmark)| LandmarkPull {
-        triangle: point.triangle.0,
-        weights: point.weights.map(|w| w as f32),
-        target: landmark.target,
-        weight: 1.0,
-    };
-    points.into_iter().zip(landmarks).map(pull).collect()
+    points.iter().zip(landmarks).map(|(point, l)| LandmarkPull::new(point, l.target)).collect()
 }
 
 /// One level's optimisation: AdamUniform on u, the energies of the paper and ours.

@@ -268,13 +268,7 @@ impl Run<'_> {
 }
 
 fn pulls(points: &[SurfacePoint], targets: &[Vec3A]) -> Vec<LandmarkPull> {
-    let pull = |(point, &target): (&SurfacePoint, &Vec3A)| LandmarkPull {
-        triangle: point.triangle.0,
-        weights: point.weights.map(|w| w as f32),
-        target,
-        weight: 1.0,
-    };
-    points.iter().zip(targets).map(pull).collect()
+    points.iter().zip(targets).map(|(point, &target)| LandmarkPull::new(point, target)).collect()
 }
 
 /// A shape moved onto another of the same vertices by a similarity.

@@ -3,6 +3,7 @@
 use glam::{DVec3, Vec3A};
 
 use super::sphere::Sphere;
+use crate::mesh::interpolate;
 use crate::numeric::weighted_rotation;
 use crate::spatial::SurfaceIndex;
 
@@ -13,9 +14,7 @@ pub fn landmarks_on_sphere(sphere: &Sphere, fitted: &[Vec3A], landmarks: &[Vec3A
     let carry = |point: &Vec3A| {
         let hit = index.closest(*point);
         let corners = triangles[hit.triangle as usize];
-        let on_sphere: Vec3A =
-            corners.iter().zip(hit.weights).map(|(&i, w)| sphere.rest[i as usize] * w).sum();
-        on_sphere.as_dvec3().normalize_or(DVec3::Z)
+        interpolate(&sphere.rest, corners, hit.weights).as_dvec3().normalize_or(DVec3::Z)
     };
     landmarks.iter().map(carry).collect()
 }

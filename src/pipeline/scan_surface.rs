@@ -1,6 +1,6 @@
 use glam::{DMat3, DVec3, Vec3A};
 
-use crate::mesh::{Normals, Topology, TriangleMesh};
+use crate::mesh::{Normals, Topology, TriangleMesh, interpolate};
 use crate::numeric::Random;
 use crate::spatial::{Hit, SurfaceIndex};
 
@@ -78,12 +78,7 @@ impl ScanSurface {
     /// The scan's smooth unit normal at a point of it.
     pub fn normal_at(&self, hit: &Hit) -> Vec3A {
         let corners = self.index.triangles()[hit.triangle as usize];
-        corners
-            .iter()
-            .zip(hit.weights)
-            .map(|(&i, w)| self.normals[i as usize] * w)
-            .sum::<Vec3A>()
-            .normalize_or_zero()
+        interpolate(&self.normals, corners, hit.weights).normalize_or_zero()
     }
 
     /// Whether a point of the scan lies on its rim: there the data ends.
@@ -128,9 +123,7 @@ fn sample(
             let (root, along) = (random.unit().sqrt(), random.unit());
             let weights = [1.0 - root, root * (1.0 - along), root * along].map(|w| w as f32);
             let corners = triangles[t];
-            let at = |values: &[Vec3A]| -> Vec3A {
-                corners.iter().zip(weights).map(|(&i, w)| values[i as usize] * w).sum()
-            };
+            let at = |values: &[Vec3A]| interpolate(values, corners, weights);
             samples.push(SurfaceSample {
                 point: at(positions),
                 normal: at(&normals.vertices).normalize_or_zero(),

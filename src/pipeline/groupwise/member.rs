@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::RestShape;
 use crate::energy::LandmarkPull;
-use crate::mesh::Normals;
+use crate::mesh::{Normals, interpolate};
 use crate::numeric::{SolveBuffer, SparseCholesky, SymmetricMatrix};
 use crate::pipeline::observer::{Canceled, Watch};
 use crate::pipeline::{GroupwiseSettings, ScanSurface, SurfaceSample};
@@ -22,7 +22,7 @@ const FAR: f32 = 0.03;
 
 /// Share of the phases after which far samples no longer lead: the template lies on the scan, follows what is near, and
 /// every vertex is held by some point of it.
-const ENTER: f64 = 0.65;
+const SETTLED: f64 = 0.65;
 
 /// One scan of the collection, and where its registration begins.
 pub struct Member<'a> {
@@ -123,18 +123,18 @@ impl<'a> Registration<'a> {
         let x = phase as f64 / (settings.phases - 1).max(1) as f64;
         let ramp = |ramp: [f32; 2]| geometric(ramp.map(f64::from), x) as f32;
         let stiffness = geometric(settings.stiffness, x);
-        let entering = x >= ENTER;
+        let settled = x >= SETTLED;
         self.phase = Phase {
             stiffness,
             // As firm as the shape is stiff, so that landmarks lead from the beginning.
             landmark_weight: settings.landmark_weight * stiffness.max(1.0),
             normal_search: ramp(settings.normal_search),
-            reach: if entering { f32::INFINITY } else { ramp(settings.reach) },
-            sample_reach: if entering { settings.sample_reach } else { ramp(settings.reach) },
-            // Once it enters, every vertex is held by the scan, whichever way it looks: none is left to stick out.
+            reach: if settled { f32::INFINITY } else { ramp(settings.reach) },
+            sample_reach: if settled { settings.sample_reach } else { ramp(settings.reach) },
             // Stiff, the shape has few ways to move and few samples show them all.
-            samples: if entering { settings.samples } else { settings.samples / 4 },
-            least_cosine: if entering { -1.0 } else { settings.least_cosine },
+            samples: if settled { settings.samples } else { settings.samples / 4 },
+            // Settled, every vertex is held by the scan, whichever way it looks: none is left to stick out.
+            least_cosine: if settled { -1.0 } else { settings.least_cosine },
         };
         self.smoother = Some(self.rest.sphere.diffusion(geometric(settings.smoothing, x)));
         if phase > 0 {
@@ -281,7 +281,7 @@ impl<'a> Registration<'a> {
     fn add_landmark_forces(&self, force: &mut [Vec3A]) {
         for landmark in self.landmarks {
             let corners = self.rest.sphere.topology.triangles[landmark.triangle as usize];
-            let now: Vec3A = corners.iter().zip(landmark.weights).map(|(&i, w)| self.p[i as usize] * w).sum();
+            let now = interpolate(&self.p, corners, landmark.weights);
             let pull = (landmark.target - now) * (self.phase.landmark_weight as f32 * landmark.weight);
             for (&i, w) in corners.iter().zip(landmark.weights) {
                 force[i as usize] += pull * w;

@@ -1,7 +1,7 @@
 use glam::Vec3A;
 use rayon::prelude::*;
 
-use crate::mesh::{Normals, Topology};
+use crate::mesh::{Normals, Topology, interpolate};
 use crate::numeric::SolveBuffer;
 use crate::pipeline::{GroupwiseSettings, Sphere};
 use crate::spatial::{Hit, SurfaceIndex};
@@ -32,8 +32,10 @@ pub fn redistribute(
     let mut buffer = SolveBuffer::default();
     let mut x = sphere.rest.clone();
     for _ in 0..STEPS {
-        let needed =
-            locate(&index, &x).par_iter().map(|hit| interpolate(topology, &need, hit)).collect::<Vec<_>>();
+        let needed = locate(&index, &x)
+            .par_iter()
+            .map(|hit| interpolate(&need, topology.triangles[hit.triangle as usize], hit.weights))
+            .collect::<Vec<_>>();
         let areas = vertex_areas(topology, &x);
         let mut psi: Vec<f32> = areas.iter().zip(&needed).map(|(a, n)| (a * n).max(1e-20).ln()).collect();
         let average = psi.iter().sum::<f32>() / psi.len() as f32;
@@ -49,11 +51,6 @@ const FLOW_LAMBDA: f64 = 1e4;
 
 fn locate(index: &SurfaceIndex, x: &[Vec3A]) -> Vec<Hit> {
     x.par_iter().with_min_len(256).map(|p| index.closest(*p)).collect()
-}
-
-fn interpolate(topology: &Topology, values: &[f32], hit: &Hit) -> f32 {
-    let corners = topology.triangles[hit.triangle as usize];
-    corners.iter().zip(hit.weights).map(|(&i, w)| values[i as usize] * w).sum()
 }
 
 /// One step of the flow along the gradient of psi, kept on the sphere; no vertex moves more than [`STRIDE`] of the

@@ -3,7 +3,7 @@ use std::sync::Arc;
 use glam::{DVec3, Vec3A};
 
 use super::redistribute;
-use crate::mesh::{SurfacePoint, TriangleId};
+use crate::mesh::{SurfacePoint, TriangleId, interpolate};
 use crate::pipeline::{GroupwiseSettings, Sphere};
 use crate::spatial::{Hit, SurfaceIndex};
 
@@ -41,10 +41,7 @@ impl SharedMesh {
 
 /// Values on the sphere `[N, 3]` at the points that its vertices moved to.
 fn carried(sphere: &Sphere, values: &[Vec3A], moved: &[Hit]) -> Vec<Vec3A> {
-    let at = |hit: &Hit| {
-        let corners = sphere.topology.triangles[hit.triangle as usize];
-        corners.iter().zip(hit.weights).map(|(&i, w)| values[i as usize] * w).sum()
-    };
+    let at = |hit: &Hit| interpolate(values, sphere.topology.triangles[hit.triangle as usize], hit.weights);
     moved.iter().map(at).collect()
 }
 
