@@ -56,9 +56,9 @@ pub fn register_member(
     Ok(registration.p)
 }
 
-/// A parameter that changes by the same factor from phase to phase.
-fn geometric(range: [f64; 2], x: f64) -> f64 {
-    range[0] * (range[1] / range[0]).powf(x)
+/// A parameter that changes by the same factor from phase to phase; evenly where an end is zero and there is no factor.
+fn geometric([first, last]: [f64; 2], x: f64) -> f64 {
+    if first > 0.0 && last > 0.0 { first * (last / first).powf(x) } else { first + (last - first) * x }
 }
 
 struct Registration<'a> {
