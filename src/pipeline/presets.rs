@@ -113,7 +113,7 @@ fn groupwise() -> GroupwiseSettings {
         curvature_power: 0.5,
         need_smoothing: 2.0,
         most_need: 10.0,
-        phases: 10,
+        phases: 12,
         iterations: 5,
         stiffness: [1000.0, 0.02],
         smoothing: [3000.0, 4.0],
@@ -126,6 +126,8 @@ fn groupwise() -> GroupwiseSettings {
         sample_least_cosine: 0.2,
         slack: 0.005,
         own_share: 0.3,
+        fall_beyond: 0.02,
+        film_stretch: 6.0,
         plane: 0.9,
     }
 }

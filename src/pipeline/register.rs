@@ -246,7 +246,8 @@ impl Run<'_> {
             }
             shared.mean = mean_shape(&shared.shapes, &trust(&shared.sphere, members, &shared.shapes));
             if round > 0 {
-                shared.redistribute(settings);
+                let scans: Vec<&ScanSurface> = members.iter().map(|member| &member.scan).collect();
+                shared.redistribute(&scans, settings);
             }
             let rest = RestShape::new(shared.sphere.clone(), shared.mean.clone());
             let one = |(member, shape): (&Prepared, &Vec<Vec3A>)| {

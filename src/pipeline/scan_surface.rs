@@ -1,4 +1,5 @@
 use glam::{DMat3, DVec3, Vec3A};
+use rayon::prelude::*;
 
 use crate::mesh::{Normals, Topology, TriangleMesh, interpolate};
 use crate::numeric::Random;
@@ -11,6 +12,8 @@ pub struct SurfaceSample {
     pub point: Vec3A,
     /// Unit normal of the scan there.
     pub normal: Vec3A,
+    /// How much that normal turns over a unit of length.
+    pub curvature: f32,
 }
 
 /// A scan made ready to be fitted: in unit space (its vertices' mean at the origin, the farthest at distance one, and
@@ -47,7 +50,8 @@ impl ScanSurface {
             mesh.positions().iter().map(|p| (rotation * (*p - centre) / radius).as_vec3a()).collect();
         let topology = Topology::of(mesh);
         let normals = Normals::new(&topology, &positions);
-        let samples = sample(mesh.triangles(), &positions, &normals, samples);
+        let curvatures = curvatures(&topology, &positions, &normals.vertices);
+        let samples = sample(mesh.triangles(), &positions, &normals, &curvatures, samples);
         Self {
             centre,
             radius,
@@ -105,11 +109,35 @@ fn rim_sides(topology: &Topology) -> Vec<[bool; 3]> {
     sides
 }
 
+/// Rounds of averaging the normals before their turning is taken for the shape's and not the noise's.
+const NORMAL_ROUNDS: usize = 4;
+
+/// How much the smoothed normal turns from a vertex to its neighbours, over the distance, `[N]`.
+fn curvatures(topology: &Topology, positions: &[Vec3A], normals: &[Vec3A]) -> Vec<f32> {
+    let ring = |i: usize| topology.neighbours.row(i).iter().map(|&j| j as usize);
+    let mut smooth = normals.to_vec();
+    for _ in 0..NORMAL_ROUNDS {
+        smooth = (0..smooth.len())
+            .into_par_iter()
+            .with_min_len(1024)
+            .map(|i| ring(i).fold(smooth[i], |sum, j| sum + smooth[j]).normalize_or_zero())
+            .collect();
+    }
+    let turn = |i: usize| {
+        let (turned, length) = ring(i).fold((0.0, 0.0), |(turned, length), j| {
+            (turned + smooth[i].distance(smooth[j]), length + positions[i].distance(positions[j]))
+        });
+        if length > 0.0 { turned / length } else { 0.0 }
+    };
+    (0..positions.len()).into_par_iter().with_min_len(1024).map(turn).collect()
+}
+
 /// Samples spread evenly by area: one in each of `count` equal stretches of the triangles laid end to end.
 fn sample(
     triangles: &[[u32; 3]],
     positions: &[Vec3A],
     normals: &Normals,
+    curvatures: &[f32],
     count: usize,
 ) -> Vec<SurfaceSample> {
     let mut random = Random::new(1);
@@ -127,6 +155,7 @@ fn sample(
             samples.push(SurfaceSample {
                 point: at(positions),
                 normal: at(&normals.vertices).normalize_or_zero(),
+                curvature: corners.iter().zip(weights).map(|(&i, w)| curvatures[i as usize] * w).sum(),
             });
             next = samples.len() as f64 + random.unit();
         }

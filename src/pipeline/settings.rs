@@ -140,6 +140,10 @@ pub struct GroupwiseSettings {
     pub slack: f32,
     /// Otherwise only by samples whose distance, times this, its own distance exceeds.
     pub own_share: f32,
+    /// A vertex farther than this in the air over the scan falls inwards in the late phases; zero lets none fall.
+    pub fall_beyond: f32,
+    /// Where a member's area is more than this many times the mean's, the mean is drawn flat.
+    pub film_stretch: f32,
     /// Share of a match's pull along the scan's normal only: 1 lets the template slide freely.
     pub plane: f32,
 }

@@ -4,6 +4,7 @@ use glam::Vec3A;
 use rayon::prelude::*;
 
 use super::RestShape;
+use super::film::fall;
 use crate::energy::LandmarkPull;
 use crate::mesh::{Normals, interpolate};
 use crate::numeric::{SolveBuffer, SparseCholesky, SymmetricMatrix};
@@ -23,6 +24,9 @@ const FAR: f32 = 0.03;
 /// Share of the phases after which far samples no longer lead: the template lies on the scan, follows what is near, and
 /// every vertex is held by some point of it.
 const SETTLED: f64 = 0.65;
+
+/// Diffusion of the normals along which films fall, so that all of one falls together.
+const FALL_SMOOTHING: f64 = 16.0;
 
 /// One scan of the collection, and where its registration begins.
 pub struct Member<'a> {
@@ -95,6 +99,7 @@ struct Phase {
     sample_reach: f32,
     least_cosine: f32,
     samples: usize,
+    fall_beyond: f32,
 }
 
 impl<'a> Registration<'a> {
@@ -135,6 +140,7 @@ impl<'a> Registration<'a> {
             samples: if settled { settings.samples } else { settings.samples / 4 },
             // Settled, every vertex is held by the scan, whichever way it looks: none is left to stick out.
             least_cosine: if settled { -1.0 } else { settings.least_cosine },
+            fall_beyond: if settled { settings.fall_beyond } else { 0.0 },
         };
         self.smoother = Some(self.rest.sphere.diffusion(geometric(settings.smoothing, x)));
         if phase > 0 {
@@ -149,9 +155,10 @@ impl<'a> Registration<'a> {
         self.index.refit(&self.p);
         let vertices = self.match_vertices();
         let samples = self.match_samples(&vertices);
+        let falls = self.falls(&vertices);
         let mut force = vec![Vec3A::ZERO; self.p.len()];
-        let distance =
-            self.add_vertex_forces(&vertices, &mut force) + self.add_sample_forces(&samples, &mut force);
+        let distance = self.add_vertex_forces(&vertices, &falls, &mut force)
+            + self.add_sample_forces(&samples, &mut force);
         self.add_landmark_forces(&mut force);
         if let Some(smoother) = &self.smoother {
             let gradients = self.rest.gradients(&self.p, smoother, &mut self.buffer);
@@ -207,6 +214,23 @@ impl<'a> Registration<'a> {
         self.hints.par_iter_mut().enumerate().with_min_len(128).map(closest).collect()
     }
 
+    /// Which matched vertices fall instead, and how far.
+    fn falls(&mut self, matches: &[Option<Hit>]) -> Vec<Option<Vec3A>> {
+        let beyond = self.phase.fall_beyond;
+        let far = |hit: &Option<Hit>| hit.is_some_and(|hit| hit.distance_squared > beyond * beyond);
+        if beyond <= 0.0 || !matches.iter().any(far) {
+            return vec![None; matches.len()];
+        }
+        let mut normals = self.normals.vertices.clone();
+        self.rest.sphere.diffusion(FALL_SMOOTHING).solve(&mut normals, &mut self.buffer);
+        let (scan, p) = (self.scan, &self.p);
+        let one = |i: usize| {
+            let falls = far(&matches[i]).then(|| fall(scan, p[i], -normals[i].normalize_or_zero(), beyond));
+            falls.flatten()
+        };
+        (0..p.len()).into_par_iter().with_min_len(128).map(one).collect()
+    }
+
     fn match_samples(&mut self, vertices: &[Option<Hit>]) -> Vec<Option<SampleHit>> {
         let (scan, index, settings) = (self.scan, &self.index, self.settings);
         let off: Vec<f32> =
@@ -244,14 +268,20 @@ impl<'a> Registration<'a> {
         (0..self.phase.samples).into_par_iter().with_min_len(128).map(closest).collect()
     }
 
-    /// Pull of each matched vertex to its closest point, mostly along the scan's normal.
-    fn add_vertex_forces(&self, matches: &[Option<Hit>], force: &mut [Vec3A]) -> f64 {
+    /// Pull of each matched vertex to its closest point, mostly along the scan's normal, or along its fall.
+    fn add_vertex_forces(
+        &self,
+        matches: &[Option<Hit>],
+        falls: &[Option<Vec3A>],
+        force: &mut [Vec3A],
+    ) -> f64 {
         let mut sum = 0.0;
-        for (i, hit) in matches.iter().enumerate() {
+        for (i, (hit, fall)) in matches.iter().zip(falls).enumerate() {
             if let Some(hit) = hit {
                 let difference = hit.point - self.p[i];
                 sum += f64::from(difference.length());
-                force[i] += along(difference, self.scan.normal_at(hit), self.settings.plane);
+                let pull = || along(difference, self.scan.normal_at(hit), self.settings.plane);
+                force[i] += fall.unwrap_or_else(pull);
             }
         }
         sum / matches.len() as f64

@@ -4,7 +4,11 @@
 //! E(p) = sum_i |n^.(p_i - q_i)|^2 + sum_s |x_s - B_s p|^2 + w_l sum_b |c_b - k_b|^2 + mu E_J(p), where E_J holds the
 //! edges to the mean's, turned and stretched by deformation gradients J that vary smoothly over the surface: any smooth
 //! deformation costs nothing, whatever its size.
+//!
+//! Cavities that only some members have, as open mouths, are closed by films in the mean; in the late phases these fall
+//! into the scans that have them (`film.rs`).
 
+mod film;
 mod mean;
 mod member;
 mod redistribution;
@@ -16,3 +20,16 @@ pub use member::{Member, register_member};
 pub use redistribution::redistribute;
 pub use rest_shape::RestShape;
 pub use shared_mesh::SharedMesh;
+
+use glam::Vec3A;
+
+use crate::mesh::{Normals, Topology};
+
+/// A third of the area around each vertex `[N]`.
+fn vertex_areas(topology: &Topology, p: &[Vec3A]) -> Vec<f32> {
+    let normals = Normals::new(topology, p);
+    let area = |i: usize| {
+        topology.fans.row(i).iter().map(|f| normals.area_vectors[f[0] as usize].length()).sum::<f32>()
+    };
+    (0..p.len()).map(|i| area(i) / 6.0).collect()
+}

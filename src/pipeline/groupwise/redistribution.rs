@@ -1,9 +1,10 @@
 use glam::Vec3A;
 use rayon::prelude::*;
 
-use crate::mesh::{Normals, Topology, interpolate};
+use super::vertex_areas;
+use crate::mesh::{Topology, interpolate};
 use crate::numeric::SolveBuffer;
-use crate::pipeline::{GroupwiseSettings, Sphere};
+use crate::pipeline::{GroupwiseSettings, ScanSurface, Sphere};
 use crate::spatial::{Hit, SurfaceIndex};
 
 /// Steps of the flow, and the share of the remaining density error that each removes.
@@ -13,19 +14,19 @@ const STRIDE: f32 = 0.2;
 
 /// Density adaptation of the shared template: vertices flow over the sphere to where the members need them.
 ///
-/// A vertex's need is what its area on a member, relative to the mean, times that member's curvature there asks for:
-/// n_i = max over members of a_mi / a_i * kappa_mi^p. The flow moves vertices along the gradient of psi, with
+/// Every sample of a scan asks for kappa^p at the point of its member that lies nearest in position and normal, kappa
+/// the scan's own curvature there, so that what a member has yet to enter counts as well; a vertex's need n_i is the
+/// most that any member asks of it. The flow moves vertices along the gradient of psi, with
 /// L psi = log(A_i n_i) - mean, until their areas A on the sphere are inverse to the need. On the sphere nothing is in
 /// the way, so no triangle folds.
 ///
 /// Returns the point of the old sphere that each vertex `[N]` moves to.
 pub fn redistribute(
     sphere: &Sphere,
-    mean: &[Vec3A],
-    members: &[Vec<Vec3A>],
+    members: &[(&ScanSurface, &[Vec3A])],
     settings: &GroupwiseSettings,
 ) -> Vec<Hit> {
-    let need = need(sphere, mean, members, settings);
+    let need = need(sphere, members, settings);
     let topology = &sphere.topology;
     let index = SurfaceIndex::new(&sphere.rest, &topology.triangles);
     let solver = sphere.diffusion(FLOW_LAMBDA);
@@ -77,42 +78,37 @@ fn flow(topology: &Topology, x: &[Vec3A], psi: &[f32]) -> Vec<Vec3A> {
     x.iter().zip(steps).map(|(x, (step, _))| (*x + step * share).normalize()).collect()
 }
 
-fn vertex_areas(topology: &Topology, p: &[Vec3A]) -> Vec<f32> {
-    let normals = Normals::new(topology, p);
-    let area = |i: usize| {
-        topology.fans.row(i).iter().map(|f| normals.area_vectors[f[0] as usize].length()).sum::<f32>()
-    };
-    (0..p.len()).map(|i| area(i) / 6.0).collect()
-}
-
-/// n_i per vertex `[N]`, on the old sphere, smoothed.
-fn need(sphere: &Sphere, mean: &[Vec3A], members: &[Vec<Vec3A>], settings: &GroupwiseSettings) -> Vec<f32> {
-    let topology = &sphere.topology;
-    let mut buffer = SolveBuffer::default();
+/// n_i per vertex `[N]`, on the old sphere, smoothed: what the scans' samples ask for where they lie nearest.
+fn need(sphere: &Sphere, members: &[(&ScanSurface, &[Vec3A])], settings: &GroupwiseSettings) -> Vec<f32> {
     let smoother = sphere.diffusion(settings.need_smoothing);
-    let mut need = vec![0f32; mean.len()];
-    for member in members {
-        let normals = Normals::new(topology, member);
-        let areas = vertex_areas(topology, member);
-        let total: f32 = areas.iter().sum();
-        let mut own: Vec<f32> = (0..member.len())
-            .map(|i| {
-                let ring = topology.neighbours.row(i);
-                let bend = |&j: &u32| {
-                    let edge = member[j as usize] - member[i];
-                    normals.vertices[i].dot(edge).abs() / edge.length_squared().max(1e-12)
-                };
-                let curvature = 2.0 * ring.iter().map(bend).sum::<f32>() / ring.len() as f32;
-                // Areas on the sphere are equal, so the member's area is its stretch.
-                areas[i] / total * curvature.clamp(1.0, 60.0).powf(settings.curvature_power)
-            })
-            .collect();
-        smoother.solve_scalar(&mut own, &mut buffer);
+    let own = |&(scan, shape): &(&ScanSurface, &[Vec3A])| {
+        let index = SurfaceIndex::new(shape, &sphere.topology.triangles);
+        let mut own = vec![0f32; shape.len()];
+        for k in 0..settings.samples {
+            let sample = scan.sample(k);
+            let search = settings.normal_search[1] * settings.normal_search[1];
+            let Some(hit) =
+                index.closest_oriented(sample.point, sample.normal, search, -1.0, f32::INFINITY, None)
+            else {
+                continue;
+            };
+            let asked = sample.curvature.clamp(1.0, 60.0).powf(settings.curvature_power);
+            let corners = sphere.topology.triangles[hit.triangle as usize];
+            for (&i, w) in corners.iter().zip(hit.weights) {
+                own[i as usize] += w * asked;
+            }
+        }
+        smoother.solve_scalar(&mut own, &mut SolveBuffer::default());
+        own
+    };
+    let all: Vec<Vec<f32>> = members.par_iter().map(own).collect();
+    let mut need = vec![0f32; sphere.rest.len()];
+    for own in all {
         need.iter_mut().zip(own).for_each(|(need, own)| *need = need.max(own));
     }
     let mut sorted = need.clone();
     sorted.sort_by(f32::total_cmp);
-    let median = sorted[sorted.len() / 2];
+    let median = sorted[sorted.len() / 2].max(f32::MIN_POSITIVE);
     need.iter_mut().for_each(|n| *n = (*n / median).clamp(0.2, settings.most_need));
     need
 }
@@ -120,6 +116,7 @@ fn need(sphere: &Sphere, mean: &[Vec3A], members: &[Vec<Vec3A>], settings: &Grou
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::mesh::{Icosphere, Normals, TriangleMesh};
 
     #[test]
     fn vertices_gather_where_a_member_is_stretched() {
@@ -133,7 +130,11 @@ mod tests {
         }
         let settings =
             crate::pipeline::Settings::preset(crate::pipeline::Preset::Default, 2562).unwrap().groupwise;
-        let hits = redistribute(&sphere, &sphere.rest, &[member], &settings);
+        let positions = member.iter().map(|p| p.as_dvec3()).collect();
+        let mesh = TriangleMesh::new(positions, Icosphere::new(4).triangles).unwrap();
+        let scan = ScanSurface::new(&mesh, 20_000);
+        let member: Vec<Vec3A> = member.iter().map(|p| scan.to_unit(p.as_dvec3())).collect();
+        let hits = redistribute(&sphere, &[(&scan, &member)], &settings);
         let moved: Vec<Vec3A> = hits.iter().map(|h| h.point).collect();
         let inside = |p: &[Vec3A]| p.iter().filter(|p| p.z > 0.9).count();
         assert!(inside(&moved) > 2 * inside(&sphere.rest), "{} {}", inside(&moved), inside(&sphere.rest));

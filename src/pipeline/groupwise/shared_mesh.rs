@@ -2,9 +2,10 @@ use std::sync::Arc;
 
 use glam::{DVec3, Vec3A};
 
+use super::film::flatten_films;
 use super::redistribute;
 use crate::mesh::{SurfacePoint, TriangleId, interpolate};
-use crate::pipeline::{GroupwiseSettings, Sphere};
+use crate::pipeline::{GroupwiseSettings, ScanSurface, Sphere};
 use crate::spatial::{Hit, SurfaceIndex};
 
 /// What the members of a collection share, and each member's positions under it, while rounds pass.
@@ -30,12 +31,15 @@ impl SharedMesh {
         }
     }
 
-    /// Moves the vertices to where the members need them, landmarks, mean and members with them.
-    pub fn redistribute(&mut self, settings: &GroupwiseSettings) {
-        let moved = redistribute(&self.sphere, &self.mean, &self.shapes, settings);
+    /// Moves the vertices to where the members need them, landmarks, mean and members with them, and draws the mean's
+    /// films flat.
+    pub fn redistribute(&mut self, scans: &[&ScanSurface], settings: &GroupwiseSettings) {
+        let members: Vec<_> = scans.iter().copied().zip(self.shapes.iter().map(Vec::as_slice)).collect();
+        let moved = redistribute(&self.sphere, &members, settings);
         self.points = relocated(&self.sphere, &self.points, &moved);
         self.mean = carried(&self.sphere, &self.mean, &moved);
         self.shapes = self.shapes.iter().map(|shape| carried(&self.sphere, shape, &moved)).collect();
+        flatten_films(&self.sphere, &mut self.mean, &self.shapes, settings.film_stretch);
     }
 }
 
