@@ -102,7 +102,8 @@ fn level(level: u32, iterations: usize) -> LevelSettings {
         rate: 0.4 * 0.5f32.powi(depth as i32),
         rate_end: 0.05,
         refresh: if depth < 2 { 2 } else { 4 },
-        // Vertices that walk stay out of ears and mouths; so do samples on coarse levels, where their way is far.
+        // With one exact vertex in eight the Chamfer distance of six scans was half as large again, with one in two
+        // a seventh; samples that walk on fine levels left it within its scatter.
         vertex_fresh: 1,
         sample_fresh: if depth < 2 { 1 } else { 4 },
         samples: (4 * (10 * 4usize.pow(level) + 2)).min(30_000),
