@@ -3,24 +3,20 @@
 use std::sync::Arc;
 
 use glam::Vec3A;
-use rayon::prelude::*;
 
+use super::matching::{SampleMatcher, Search, VertexMatcher};
 use super::observer::{Canceled, Watch};
 use super::scan_surface::ScanSurface;
 use super::settings::{Density, FitSettings, LevelSettings, Ramp};
 use super::sphere::Sphere;
 use crate::density::{CurvatureDensity, uniform_lengths};
 use crate::energy::{
-    Adaptation, Foldover, Gradient, LandmarkPull, Landmarks, Pull, SampleMatch, SampleNormals,
-    ScanToTemplate, Shape, TemplateToScan, VertexMatch, VertexNormals,
+    Adaptation, Foldover, Gradient, LandmarkPull, Landmarks, Pull, SampleNormals, ScanToTemplate, Shape,
+    TemplateToScan, VertexNormals,
 };
 use crate::mesh::{Normals, SurfacePoint, mean_edge_lengths};
 use crate::numeric::{AdamUniform, SolveBuffer};
 use crate::reparam::Reparameterization;
-use crate::spatial::SurfaceIndex;
-
-/// Search trees of a deforming template are rebuilt after this many refits.
-const REFITS: usize = 40;
 
 /// A landmark for every level to pull: its place on the unit sphere, and on the scan in unit space.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -36,6 +32,16 @@ pub struct SphereLandmark {
 /// # Errors
 /// [`Canceled`] if the observer asked to stop.
 pub fn fit(
+    scan: &ScanSurface,
+    settings: &FitSettings,
+    landmarks: &[SphereLandmark],
+    watch: &Watch,
+) -> Result<Vec<Vec3A>, Canceled> {
+    // On a thread of the pool: from outside, each of the many short parallel loops would wait to be let in.
+    rayon::scope(|_| fit_levels(scan, settings, landmarks, watch))
+}
+
+fn fit_levels(
     scan: &ScanSurface,
     settings: &FitSettings,
     landmarks: &[SphereLandmark],
@@ -80,11 +86,8 @@ struct Deformation<'a> {
     positions: Vec<Vec3A>,
     normals: Normals,
     gradient: Gradient,
-    index: SurfaceIndex,
-    vertex_matches: Vec<VertexMatch>,
-    /// The scan triangle each vertex was matched to: the next search begins there.
-    hints: Vec<u32>,
-    sample_matches: Vec<SampleMatch>,
+    vertices: VertexMatcher,
+    samples: Option<SampleMatcher>,
     buffer: SolveBuffer,
 }
 
@@ -114,10 +117,9 @@ impl<'a> Deformation<'a> {
             adam: AdamUniform::new(positions.len()),
             normals: Normals::new(topology, &positions),
             gradient: Gradient::zero(topology),
-            index: SurfaceIndex::new(&positions, &topology.triangles),
-            vertex_matches: vec![VertexMatch::default(); positions.len()],
-            hints: vec![0; positions.len()],
-            sample_matches: vec![SampleMatch::default(); settings.samples],
+            vertices: VertexMatcher::new(positions.len()),
+            samples: (settings.samples > 0)
+                .then(|| SampleMatcher::new(scan, settings.samples, topology, &positions)),
             positions,
             buffer: SolveBuffer::default(),
         }
@@ -129,8 +131,7 @@ impl<'a> Deformation<'a> {
         self.update_positions();
         if iteration.is_multiple_of(self.settings.refresh.max(1)) {
             let round = iteration / self.settings.refresh.max(1);
-            self.match_vertices(x);
-            self.match_samples(x, round);
+            self.update_matches(x, round);
         }
         let energy = self.add_energies(x);
         let shape =
@@ -152,60 +153,18 @@ impl<'a> Deformation<'a> {
         self.normals.update(&self.sphere.topology, &self.positions);
     }
 
-    /// The closest scan point of every template vertex, in position and normal together.
-    fn match_vertices(&mut self, x: f32) {
-        let Self { scan, settings, positions, normals, hints, vertex_matches, .. } = self;
-        let search = at(settings.normal_search, x);
-        vertex_matches.par_iter_mut().zip(hints).enumerate().with_min_len(128).for_each(
-            |(i, (matched, hint))| {
-                let hit = scan.index.closest_oriented(
-                    positions[i],
-                    normals.vertices[i],
-                    search * search,
-                    settings.least_cosine,
-                    f32::INFINITY,
-                    Some(*hint),
-                );
-                *matched = hit.map_or(VertexMatch::default(), |hit| {
-                    *hint = hit.triangle;
-                    let weight = if scan.on_rim(&hit) { 0.0 } else { 1.0 };
-                    VertexMatch { point: hit.point, normal: scan.normal_at(&hit), weight }
-                });
-            },
-        );
-    }
-
-    /// The closest template point of scan samples, other ones each round.
-    fn match_samples(&mut self, x: f32, round: usize) {
-        if self.settings.samples == 0 {
-            return;
+    /// Finds closest points in both directions anew.
+    fn update_matches(&mut self, x: f32, round: usize) {
+        let Self { scan, settings, positions, normals, .. } = self;
+        let normal_search = at(settings.normal_search, x);
+        let LevelSettings { least_cosine, vertex_fresh, sample_fresh, .. } = **settings;
+        let search = Search { normal_search, least_cosine, fresh: vertex_fresh };
+        self.vertices.update(scan, positions, normals, search, round);
+        if let Some(samples) = &mut self.samples {
+            // Samples see more than vertices do: into folds that the template has yet to enter.
+            let search = Search { normal_search, least_cosine: -0.3, fresh: sample_fresh };
+            samples.update(scan, positions, search, round);
         }
-        if round.is_multiple_of(REFITS) {
-            self.index = SurfaceIndex::new(&self.positions, &self.sphere.topology.triangles);
-        } else {
-            self.index.refit(&self.positions);
-        }
-        let search = at(self.settings.normal_search, x);
-        let (scan, index, first) = (self.scan, &self.index, round * self.settings.samples);
-        self.sample_matches.par_iter_mut().enumerate().with_min_len(128).for_each(|(i, matched)| {
-            let sample = scan.sample(first + i);
-            let hit = index.closest_oriented(
-                sample.point,
-                sample.normal,
-                search * search,
-                // Samples see more than vertices do: into folds that the template has yet to enter.
-                -0.3,
-                f32::INFINITY,
-                None,
-            );
-            *matched = hit.map_or(SampleMatch::default(), |hit| SampleMatch {
-                triangle: hit.triangle,
-                weight: 1.0,
-                weights: hit.weights,
-                point: sample.point,
-                normal: sample.normal,
-            });
-        });
     }
 
     /// E = D_c + D_n in both directions + w_u E_a + w_k E_a + foldover + landmarks.
@@ -217,11 +176,10 @@ impl<'a> Deformation<'a> {
         let shape = Shape { topology, positions: &self.positions, normals: &self.normals };
         let normal = at(settings.normal_weight, x);
         let floor = 0.2 * self.normals.mean_area_vector();
-        let vertices = &self.vertex_matches;
+        let vertices = &self.vertices.matches;
         let mut energy = TemplateToScan { matches: vertices, pull: Pull::Distance }.add(shape, 1.0, gradient);
         energy += f64::from(normal) * VertexNormals { matches: vertices }.add(shape, normal, gradient);
-        if settings.samples > 0 {
-            let samples = &self.sample_matches;
+        if let Some(SampleMatcher { matches: samples, .. }) = &self.samples {
             energy += ScanToTemplate { matches: samples, pull: Pull::Distance }.add(shape, 1.0, gradient);
             energy +=
                 f64::from(normal) * SampleNormals { matches: samples, floor }.add(shape, normal, gradient);

@@ -4,6 +4,7 @@ mod comparison;
 mod fit;
 mod groupwise;
 mod manifest;
+mod matching;
 mod observer;
 mod package;
 mod presets;

@@ -61,6 +61,9 @@ impl Settings {
 }
 
 /// Section 5.1 and the supplement: one level, fixed weights, no decay of the step.
+///
+/// The closest points are the paper's but for `vertex_fresh`: on four scans, fits with one exact search in eight lay
+/// as close as those with all of them exact (Chamfer distances 0.88 to 1.18 times as large, the geometric mean 1.00).
 fn paper(level: u32) -> FitSettings {
     FitSettings {
         start_radius: 1.0,
@@ -71,6 +74,8 @@ fn paper(level: u32) -> FitSettings {
             rate: 1e-2,
             rate_end: 1.0,
             refresh: 1,
+            vertex_fresh: 8,
+            sample_fresh: 1,
             samples: 0,
             normal_weight: [1.0, 1.0],
             normal_search: [0.0, 0.0],
@@ -97,6 +102,10 @@ fn level(level: u32, iterations: usize) -> LevelSettings {
         rate: 0.4 * 0.5f32.powi(depth as i32),
         rate_end: 0.05,
         refresh: if depth < 2 { 2 } else { 4 },
+        // With one exact vertex in eight the Chamfer distance of six scans was half as large again, with one in two
+        // a seventh; samples that walk on fine levels left it within its scatter.
+        vertex_fresh: 1,
+        sample_fresh: if depth < 2 { 1 } else { 4 },
         samples: (4 * (10 * 4usize.pow(level) + 2)).min(30_000),
         normal_weight: [0.06, 0.3],
         normal_search: [0.15 * shrink, 0.045 * shrink],

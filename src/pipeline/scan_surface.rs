@@ -3,7 +3,7 @@ use rayon::prelude::*;
 
 use crate::mesh::{Normals, Topology, TriangleMesh, interpolate};
 use crate::numeric::Random;
-use crate::spatial::{Hit, SurfaceIndex};
+use crate::spatial::{Hit, SurfaceIndex, SurfaceWalk};
 
 /// A point of the scan and its unit normal.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -25,8 +25,12 @@ pub struct ScanSurface {
     pub radius: f64,
     /// How it is turned from its own space to unit space.
     pub rotation: DMat3,
+    /// Vertex positions in unit space.
+    pub positions: Vec<Vec3A>,
     /// Nearest points, in unit space.
     pub index: SurfaceIndex,
+    /// Nearest points from the last answer on.
+    pub walk: SurfaceWalk,
     /// Evenly spread samples in random order, so that any stretch of them covers the surface.
     pub samples: Vec<SurfaceSample>,
     /// Unit normals per vertex, interpolated by [`ScanSurface::normal_at`].
@@ -48,15 +52,23 @@ impl ScanSurface {
         let radius = mesh.radius_about(centre);
         let positions: Vec<Vec3A> =
             mesh.positions().iter().map(|p| (rotation * (*p - centre) / radius).as_vec3a()).collect();
-        let topology = Topology::of(mesh);
-        let normals = Normals::new(&topology, &positions);
-        let curvatures = curvatures(&topology, &positions, &normals.vertices);
-        let samples = sample(mesh.triangles(), &positions, &normals, &curvatures, samples);
+        let (index, (topology, normals, samples)) = rayon::join(
+            || SurfaceIndex::new(&positions, mesh.triangles()),
+            || {
+                let topology = Topology::of(mesh);
+                let normals = Normals::new(&topology, &positions);
+                let curvatures = curvatures(&topology, &positions, &normals.vertices);
+                let samples = sample(mesh.triangles(), &positions, &normals, &curvatures, samples);
+                (topology, normals, samples)
+            },
+        );
         Self {
             centre,
             radius,
             rotation,
-            index: SurfaceIndex::new(&positions, mesh.triangles()),
+            index,
+            walk: SurfaceWalk::new(&topology),
+            positions,
             samples,
             normals: normals.vertices,
             rim_sides: rim_sides(&topology),

@@ -147,13 +147,7 @@ impl SurfaceIndex {
         bound: f32,
         hint: Option<u32>,
     ) -> Option<Hit> {
-        let query = Oriented {
-            p: Lanes::splat(p),
-            n: Lanes::splat(n),
-            normal_weight: Vec4::splat(normal_weight),
-            min_cosine: Vec4::splat(min_cosine),
-            bound: Vec4::splat(bound),
-        };
+        let query = Oriented::new(p, n, normal_weight, min_cosine, bound);
         let mut best = Best { triangle: None, cost: f32::INFINITY };
         if let Some(hint) = hint {
             let (packet, lane) = self.place_of(hint);
@@ -199,7 +193,7 @@ impl SurfaceIndex {
 }
 
 /// A search in position and normal together; every field holds the same in all lanes.
-struct Oriented {
+pub(super) struct Oriented {
     p: Lanes,
     n: Lanes,
     normal_weight: Vec4,
@@ -208,9 +202,20 @@ struct Oriented {
 }
 
 impl Oriented {
+    #[inline]
+    pub fn new(p: Vec3A, n: Vec3A, normal_weight: f32, min_cosine: f32, bound: f32) -> Self {
+        Self {
+            p: Lanes::splat(p),
+            n: Lanes::splat(n),
+            normal_weight: Vec4::splat(normal_weight),
+            min_cosine: Vec4::splat(min_cosine),
+            bound: Vec4::splat(bound),
+        }
+    }
+
     /// Costs of four triangles, infinite for those that do not qualify.
     #[inline]
-    fn packet_cost(&self, packet: &Packet) -> Vec4 {
+    pub fn packet_cost(&self, packet: &Packet) -> Vec4 {
         let distance = packet.distance_squared(self.p);
         let cosine = packet.cosine(self.n);
         let qualifies = distance.cmple(self.bound) & cosine.cmpgt(self.min_cosine);

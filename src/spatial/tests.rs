@@ -3,6 +3,7 @@
 use glam::Vec3A;
 
 use super::{Feature, Hit, SurfaceIndex, SurfaceWalk, closest_on_triangle};
+use crate::mesh::Topology;
 
 /// A small generator (splitmix64), so that the tests need no crate for it.
 struct Random(u64);
@@ -270,18 +271,26 @@ fn query_that_is_no_number_ends() {
 fn walk_reaches_the_nearest_point_on_a_smooth_surface() {
     let (positions, triangles) = bumpy_sphere(40);
     let index = SurfaceIndex::new(&positions, &triangles);
-    let walk = SurfaceWalk::new(positions.len(), &triangles);
+    let walk = SurfaceWalk::new(&Topology::new(positions.len(), &triangles));
     let mut random = Random(7);
-    let mut reached = 0;
-    for _ in 0..1000 {
-        let p = index.closest(random.point()).point + 0.02 * random.point();
-        let from = index.closest(p + 0.05 * random.point()).triangle;
-        let (walked, exact) = (walk.closest(&positions, p, from), index.closest(p));
-        assert_coherent(&walked, &positions, &triangles, p);
-        assert!(walked.distance_squared >= exact.distance_squared - 1e-7);
-        reached += usize::from(close(walked.distance_squared, exact.distance_squared));
+    for (normal_weight, least) in [(0.0, 980), (0.01, 900)] {
+        let mut reached = 0;
+        for _ in 0..1000 {
+            let near = index.closest(random.point());
+            let (p, n) = (near.point + 0.02 * random.point(), index.triangle_normal(near.triangle));
+            let from = index.closest(p + 0.05 * random.point()).triangle;
+            let walked = walk.closest_oriented(&positions, p, n, normal_weight, -1.0, from).unwrap();
+            let exact = index.closest_oriented(p, n, normal_weight, -1.0, f32::INFINITY, None).unwrap();
+            assert_coherent(&walked, &positions, &triangles, p);
+            let [walked, exact] = [walked, exact].map(|hit| {
+                let turn = n.distance_squared(index.triangle_normal(hit.triangle));
+                hit.distance_squared + normal_weight * turn
+            });
+            assert!(walked >= exact - 1e-7);
+            reached += usize::from(close(walked, exact));
+        }
+        assert!(reached > least, "{reached} with {normal_weight}");
     }
-    assert!(reached > 980, "{reached}");
 }
 
 #[test]
@@ -289,8 +298,21 @@ fn walk_stops_at_a_rim() {
     let (mut positions, triangles) = bumpy_sphere(10);
     positions.push(Vec3A::ZERO);
     let half = &triangles[..200];
-    let walk = SurfaceWalk::new(positions.len(), half);
-    let hit = walk.closest(&positions, Vec3A::new(0.1, 0.2, -5.0), 3);
-    assert_coherent_far(&hit, &positions, half, Vec3A::new(0.1, 0.2, -5.0));
+    let walk = SurfaceWalk::new(&Topology::new(positions.len(), half));
+    let p = Vec3A::new(0.1, 0.2, -5.0);
+    let hit = walk.closest_oriented(&positions, p, Vec3A::Z, 0.0, -1.0, 3).unwrap();
+    assert_coherent_far(&hit, &positions, half, p);
     assert!(matches!(Feature::of(hit.weights), Feature::Edge(_) | Feature::Vertex(_)));
+}
+
+#[test]
+fn walk_keeps_to_triangles_that_qualify() {
+    let (positions, triangles) = bumpy_sphere(40);
+    let walk = SurfaceWalk::new(&Topology::new(positions.len(), &triangles));
+    let outward = closest_on_triangle(2.0 * Vec3A::X, corners(&positions, triangles[0])).point.normalize();
+    for (n, qualifies) in [(outward, true), (-outward, false)] {
+        let hit = walk.closest_oriented(&positions, outward, n, 0.0, 0.5, 0);
+        assert_eq!(hit.is_some(), qualifies);
+    }
+    assert_eq!(walk.closest_oriented(&positions, Vec3A::NAN, Vec3A::X, 0.1, 0.0, 0), None);
 }

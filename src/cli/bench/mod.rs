@@ -16,6 +16,8 @@ use clock::Clock;
 
 /// Triangles of a sculpted scan.
 const TRIANGLES: usize = 120_000;
+/// Triangles of a large one, whose fit is to take at most twice the time.
+const MANY_TRIANGLES: usize = 1_000_000;
 /// Scans of a sculpted collection.
 const HEADS: usize = 12;
 
@@ -24,7 +26,7 @@ const HEADS: usize = 12;
 pub struct Bench {
     /// Scans to fit, and collections (folders or manifests) to register; sculpted heads unless given
     inputs: Vec<PathBuf>,
-    /// Fewer repetitions, no template of 40962 vertices, a smaller sculpted collection
+    /// Fewer repetitions, no template of 40962 vertices, no scan of a million triangles, a smaller sculpted collection
     #[arg(long)]
     quick: bool,
     /// Leaves a part out; may be repeated
@@ -71,6 +73,10 @@ impl Bench {
                 stages::paper(&clock, &name, &scan)?;
             }
         }
+        if self.does(Part::Fits) && sculpted && !self.quick {
+            let large = sculpted_scan(MANY_TRIANGLES);
+            stages::fits(&clock, &large.0, &large.1, 10242)?;
+        }
         if self.does(Part::Kernels) {
             kernels::solves(&clock, finest);
             kernels::iteration(&clock);
@@ -89,8 +95,7 @@ fn is_collection(path: &std::path::Path) -> bool {
 
 fn scans_of(paths: &[PathBuf], sculpted: bool) -> anyhow::Result<Vec<(String, TriangleMesh)>> {
     if sculpted {
-        let head = sculpt(1, TRIANGLES).remove(0);
-        return Ok(vec![(format!("sculpted, {} triangles", head.mesh.triangles().len()), head.mesh)]);
+        return Ok(vec![sculpted_scan(TRIANGLES)]);
     }
     let read = |path: &PathBuf| {
         let mesh = read_mesh(path).with_context(|| "a scan to fit")?;
@@ -98,6 +103,11 @@ fn scans_of(paths: &[PathBuf], sculpted: bool) -> anyhow::Result<Vec<(String, Tr
         Ok((format!("{name}, {} triangles", mesh.triangles().len()), mesh))
     };
     paths.iter().map(read).collect()
+}
+
+fn sculpted_scan(triangles: usize) -> (String, TriangleMesh) {
+    let mesh = sculpt(1, triangles).remove(0).mesh;
+    (format!("sculpted, {} triangles", mesh.triangles().len()), mesh)
 }
 
 /// Sculpted heads of about this many triangles.
