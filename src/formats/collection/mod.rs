@@ -11,7 +11,8 @@ use std::path::{Path, PathBuf};
 
 use super::error::FormatError;
 use super::input::{InputFile, read_file};
-use super::{Scheme, parse_landmarks, read_mesh_and_inputs};
+use super::landmarks::LandmarkFile;
+use super::mesh_file::MeshFile;
 use crate::mesh::{LandmarkSet, TriangleMesh};
 
 /// Scans with their landmarks, sorted by name; at least one landmark is present on all of them.
@@ -29,8 +30,8 @@ pub struct Member {
     pub mesh: PathBuf,
     /// The landmarks' file.
     pub landmarks_file: InputFile,
-    /// The landmarks.
-    pub landmarks: LandmarkSet,
+    /// The landmarks, perhaps by vertices or triangles of the mesh.
+    pub landmarks: LandmarkFile,
 }
 
 /// A scan that has been read whole.
@@ -68,7 +69,7 @@ pub enum CollectionError {
     },
     /// No scan is there.
     #[error("{}: holds no scan: expected NAME/scan.ply with NAME/landmarks.json, or NAME.ply with NAME.landmarks.json \
-             (ply, obj, glb or gltf)", path.display())]
+             (ply, obj, stl, glb or gltf; json, ljson, pp, txt or mrk.json)", path.display())]
     Empty {
         /// The folder or manifest.
         path: PathBuf,
@@ -82,12 +83,20 @@ pub enum CollectionError {
         meshes: Vec<String>,
     },
     /// A scan has no landmarks.
-    #[error("scan `{name}` has no landmarks: expected {}", expected.display())]
+    #[error("scan `{name}` has no landmarks: expected {} (or {})", expected.display(), LandmarkFile::EXTENSIONS[1..].join(", "))]
     MissingLandmarks {
         /// The scan.
         name: String,
         /// Where they should be.
         expected: PathBuf,
+    },
+    /// A scan has several files of landmarks.
+    #[error("scan `{name}` has several files of landmarks ({}): keep one", files.join(", "))]
+    SeveralLandmarks {
+        /// The scan.
+        name: String,
+        /// The files' names.
+        files: Vec<String>,
     },
     /// The mesh that a manifest names is not there.
     #[error("scan `{name}` has no mesh: {} does not exist", path.display())]
@@ -154,15 +163,18 @@ struct Source {
     name: String,
     mesh: PathBuf,
     landmarks: PathBuf,
+    /// What the landmarks are called, if their own file does not say.
+    scheme: Option<String>,
 }
 
 impl Collection {
     /// Opens a folder of scans or a JSON manifest, and reads all landmarks. Meshes are read by [`Member::read`].
     ///
     /// A folder holds `NAME/scan.ply` with `NAME/landmarks.json`, or `NAME.ply` with `NAME.landmarks.json`, where the
-    /// mesh may also be OBJ, GLB or glTF; of several meshes in `NAME/`, that called `scan` is taken. Folders without a
-    /// mesh and names that begin with a dot are passed over. A manifest is
-    /// `{"scans": [{"name": "...", "mesh": "path", "landmarks": "path"}, ...]}`, paths relative to its folder.
+    /// mesh may also be OBJ, STL, GLB or glTF, and the landmarks any of [`LandmarkFile::EXTENSIONS`]; of several meshes
+    /// in `NAME/`, that called `scan` is taken. Folders without a mesh and names that begin with a dot are passed over.
+    /// A manifest is `{"scans": [{"name": "...", "mesh": "path", "landmarks": "path"}, ...]}`, paths relative to its
+    /// folder; its `"scheme"`, or that of a scan, is for landmarks whose own file states none.
     ///
     /// # Errors
     /// [`CollectionError`] names the scan or the file, and what was expected.
@@ -187,20 +199,20 @@ impl Collection {
 
     /// The names of the landmarks that are present on every scan, in the order of the first scan.
     pub fn common_landmarks(&self) -> Vec<&str> {
-        let first = self.members[0].landmarks.present().map(|(name, _)| name);
+        let first = self.members[0].landmarks.present();
         let common = common_names(&self.members).unwrap_or_default();
         first.filter(|name| common.contains(name)).collect()
     }
 
     /// The landmark scheme that the scans state, if any does.
     pub fn scheme(&self) -> Option<&str> {
-        self.members.iter().find_map(|member| member.landmarks.scheme.as_deref())
+        self.members.iter().find_map(|member| member.landmarks.scheme())
     }
 }
 
 impl Member {
     fn open(source: Source) -> Result<Self, CollectionError> {
-        let Source { name, mesh, landmarks: file } = source;
+        let Source { name, mesh, landmarks: file, scheme } = source;
         if !mesh.exists() {
             return Err(CollectionError::MissingMesh { name, path: mesh });
         }
@@ -209,8 +221,11 @@ impl Member {
         }
         let read = || {
             let bytes = read_file(&file)?;
-            let landmarks = parse_landmarks(&bytes).map_err(|error| error.in_file(&file))?;
-            Ok((InputFile::of(&file, &bytes), landmarks))
+            let landmarks = LandmarkFile::parse(&bytes).and_then(|landmarks| match &scheme {
+                Some(scheme) => landmarks.or_scheme(scheme),
+                None => Ok(landmarks),
+            });
+            Ok((InputFile::of(&file, &bytes), landmarks.map_err(|error| error.in_file(&file))?))
         };
         match read() {
             Ok((landmarks_file, landmarks)) => Ok(Self { name, mesh, landmarks_file, landmarks }),
@@ -218,15 +233,17 @@ impl Member {
         }
     }
 
-    /// Reads the scan's mesh.
+    /// Reads the scan's mesh, and finds the landmarks on it.
     ///
     /// # Errors
     /// [`CollectionError::Scan`] with the file and what is wrong in it.
     pub fn read(&self) -> Result<Scan, CollectionError> {
-        let (mesh, mut inputs) = read_mesh_and_inputs(&self.mesh)
-            .map_err(|error| CollectionError::Scan { name: self.name.clone(), error })?;
+        let failed = |error| CollectionError::Scan { name: self.name.clone(), error };
+        let (file, mut inputs) = MeshFile::read_with_inputs(&self.mesh).map_err(failed)?;
+        let landmarks = self.landmarks.on(&file);
+        let landmarks = landmarks.map_err(|error| failed(error.in_file(&self.landmarks_file.path)))?;
         inputs.push(self.landmarks_file.clone());
-        Ok(Scan { name: self.name.clone(), mesh, landmarks: self.landmarks.clone(), inputs })
+        Ok(Scan { name: self.name.clone(), mesh: file.mesh, landmarks, inputs })
     }
 }
 
@@ -250,12 +267,12 @@ fn check_names(sources: &[Source]) -> Result<(), CollectionError> {
 }
 
 fn check_schemes(members: &[Member]) -> Result<(), CollectionError> {
-    let known = |name: &str| Scheme::named(name).map_or(name.to_owned(), |scheme| scheme.name.to_owned());
-    let mut stated = members.iter().filter_map(|member| Some((member, member.landmarks.scheme.as_deref()?)));
+    // Subsets of a scheme state the whole.
+    let mut stated = members.iter().filter_map(|member| Some((member, member.landmarks.scheme()?)));
     let Some((first, first_scheme)) = stated.next() else {
         return Ok(());
     };
-    match stated.find(|(_, scheme)| known(scheme) != known(first_scheme)) {
+    match stated.find(|(_, scheme)| scheme != &first_scheme) {
         Some((second, second_scheme)) => Err(CollectionError::SchemesDiffer {
             first: first.name.clone(),
             first_scheme: first_scheme.to_owned(),
@@ -288,7 +305,7 @@ fn common_names(members: &[Member]) -> Result<BTreeSet<&str>, (&Member, BTreeSet
 }
 
 fn present_names(member: &Member) -> BTreeSet<&str> {
-    member.landmarks.present().map(|(name, _)| name).collect()
+    member.landmarks.present().collect()
 }
 
 fn some_of(names: &BTreeSet<&str>) -> String {
