@@ -9,17 +9,18 @@ use crate::allocator::most_held;
 use crate::mutation::damage;
 use crate::seeds;
 
-/// Copies where nothing else is asked for.
+/// Copies where nothing else is asked for; fewer where each is a file.
 const SHARE: u64 = 10_000;
+const SHARE_OF_FILES: u64 = 1_000;
 /// What a reader may take for a damaged copy of a small file.
 const MEMORY: usize = 8 << 20;
 const TIME: Duration = Duration::from_secs(5);
 
 /// Gives a reader damaged copies of all its files, as many to each as together make the number asked for.
-fn feed(reader: &str, files: &[Vec<u8>], read: impl Fn(&[u8])) {
+fn feed(reader: &str, files: &[Vec<u8>], share: u64, read: impl Fn(&[u8])) {
     let asked =
         std::env::var("ONEMESH_FUZZ").ok().map(|count| count.parse().expect("ONEMESH_FUZZ is a count"));
-    let rounds = asked.unwrap_or(SHARE).div_ceil(files.len() as u64);
+    let rounds = asked.unwrap_or(share).div_ceil(files.len() as u64);
     let (mut inputs, mut slowest, mut largest) = (0u64, Duration::ZERO, 0);
     for file in files {
         damage(file, rounds, |bytes| {
@@ -31,7 +32,8 @@ fn feed(reader: &str, files: &[Vec<u8>], read: impl Fn(&[u8])) {
             (inputs, slowest, largest) = (inputs + 1, slowest.max(took), largest.max(held));
         });
     }
-    println!("{reader}: {inputs} inputs, slowest {slowest:.1?}, most memory {} KiB", largest / 1024);
+    assert!(largest > 0, "memory is counted");
+    println!("{reader}: {inputs} inputs, slowest {slowest:.1?}, most memory {largest} bytes");
 }
 
 fn feed_mesh(reader: &str, format: MeshFormat, files: &[Vec<u8>]) {
@@ -40,13 +42,13 @@ fn feed_mesh(reader: &str, format: MeshFormat, files: &[Vec<u8>]) {
         let whole = MeshFile::parse(file, format).unwrap_or_else(|error| panic!("{reader}: {error}"));
         assert_eq!(whole.mesh.triangles().len(), 2, "{reader}");
     }
-    feed(reader, files, |bytes| drop(MeshFile::parse(bytes, format)));
+    feed(reader, files, SHARE, |bytes| drop(MeshFile::parse(bytes, format)));
 }
 
 fn feed_landmarks(reader: &str, file: &str) {
     let mesh = MeshFile::parse(seeds::OBJ.as_bytes(), MeshFormat::Obj).unwrap();
     LandmarkFile::parse(file.as_bytes()).and_then(|file| file.on(&mesh)).unwrap();
-    feed(reader, &[file.as_bytes().to_vec()], |bytes| {
+    feed(reader, &[file.as_bytes().to_vec()], SHARE, |bytes| {
         drop(LandmarkFile::parse(bytes).and_then(|file| file.on(&mesh)));
     });
 }
@@ -67,7 +69,7 @@ fn damage_to_mtl() {
         MeshFile::read(&path).unwrap().texture.unwrap().images.len()
     };
     assert_eq!(read(seeds::MTL.as_bytes()), 1);
-    feed("mtl", &[seeds::MTL.into()], |bytes| {
+    feed("mtl", &[seeds::MTL.into()], SHARE_OF_FILES, |bytes| {
         read(bytes);
     });
 }
@@ -128,5 +130,5 @@ fn damage_to_manifests() {
         Collection::open(&path)
     };
     assert_eq!(open(manifest.as_bytes()).unwrap().members().len(), 1);
-    feed("manifest", &[manifest.into()], |bytes| drop(open(bytes)));
+    feed("manifest", &[manifest.into()], SHARE_OF_FILES, |bytes| drop(open(bytes)));
 }

@@ -31,8 +31,8 @@ pub(super) fn coordinates(buffers: &Buffers, index: usize) -> Result<Vec<DVec2>,
     let accessor = buffers.document().accessor(index)?;
     expect_shape(&accessor, "VEC2", &place)?;
     let component = Component::coded(accessor.component_type, &place)?;
-    let scale = if accessor.normalized { component.unit() } else { 1.0 };
-    let decode = |bytes: &[u8]| DVec2::from([0, 1].map(|axis| component.decode(bytes, axis) * scale));
+    let unit = if accessor.normalized { component.unit() } else { 1.0 };
+    let decode = |bytes: &[u8]| DVec2::from([0, 1].map(|axis| component.decode(bytes, axis) / unit));
     let coordinates = values(&accessor, buffers, Item { component, width: 2 }, &place, decode)?;
     match coordinates.iter().find(|coordinate| !coordinate.is_finite()) {
         Some(wrong) => Err(Fault::at(place, format!("holds {wrong}, which must be finite numbers"))),
@@ -50,8 +50,7 @@ pub(super) fn colours(buffers: &Buffers, index: usize) -> Result<Vec<[u8; 4]>, F
         other => return Err(Fault::at(place, format!("is of type {other}, where VEC3 or VEC4 is needed"))),
     };
     let component = Component::coded(accessor.component_type, &place)?;
-    let scale = 255.0 * component.unit();
-    let channel = |bytes: &[u8], at| (component.decode(bytes, at) * scale).round() as u8;
+    let channel = |bytes: &[u8], at| (component.decode(bytes, at) / component.unit() * 255.0).round() as u8;
     let decode = |bytes: &[u8]| [0, 1, 2, 3].map(|at| if at < width { channel(bytes, at) } else { 255 });
     values(&accessor, buffers, Item { component, width }, &place, decode)
 }
@@ -222,7 +221,7 @@ impl Component {
         }
     }
 
-    /// What scales integers to [-1, 1] or [0, 1].
+    /// What stands for 1 where integers are scaled to [-1, 1] or [0, 1].
     fn unit(self) -> f64 {
         let largest: i32 = match self {
             Self::I8 => i8::MAX.into(),
@@ -231,14 +230,14 @@ impl Component {
             Self::U16 => u16::MAX.into(),
             Self::U32 | Self::F32 => 1,
         };
-        1.0 / f64::from(largest)
+        f64::from(largest)
     }
 
-    /// The same, where the least integer too becomes -1.
+    /// Scales integers to it, where the least too becomes -1.
     fn normalize(self, stored: DVec3) -> DVec3 {
         match self {
             Self::U32 | Self::F32 => stored,
-            _ => (stored * self.unit()).max(DVec3::NEG_ONE),
+            _ => (stored / self.unit()).max(DVec3::NEG_ONE),
         }
     }
 

@@ -14,6 +14,8 @@ use crate::formats::texture::{ImageOrigin, Texture};
 pub(super) struct Surface<'g, 'a> {
     buffers: &'g Buffers<'a>,
     images: Images<'g, 'a>,
+    /// By material.
+    pictures: HashMap<usize, Picture>,
     /// For each vertex up to the last that has one.
     colours: Vec<[u8; 4]>,
     coordinates: Vec<DVec2>,
@@ -25,11 +27,21 @@ pub(super) struct Surface<'g, 'a> {
     warnings: Vec<String>,
 }
 
+/// What a material shows.
+#[derive(Clone, Copy, Default)]
+struct Picture {
+    /// Its number among the images, if it is there.
+    image: Option<u32>,
+    /// The set of texture coordinates that it lies by.
+    set: usize,
+}
+
 impl<'g, 'a> Surface<'g, 'a> {
     pub fn new(buffers: &'g Buffers<'a>) -> Self {
         Self {
             buffers,
             images: Images::new(buffers),
+            pictures: HashMap::new(),
             colours: Vec::new(),
             coordinates: Vec::new(),
             placed: HashMap::new(),
@@ -56,23 +68,29 @@ impl<'g, 'a> Surface<'g, 'a> {
     /// Takes what a primitive says of its triangles, whose corners, `before` of which came earlier, are vertices of the
     /// `count` from `first` on.
     pub fn triangles(&mut self, primitive: &Primitive, corners: &[u32], vertices: (u32, u32), before: usize) {
-        let texture = match primitive.material.map(|material| self.base_colour(material)) {
-            Some(Ok(texture)) => texture,
-            Some(Err(fault)) => {
-                self.warn(fault);
-                None
-            }
-            None => None,
-        };
-        let set = texture.as_ref().map_or(0, |texture| texture.tex_coord);
-        let Some(accessor) = primitive.attributes.coordinates(set) else { return };
+        let picture = primitive.material.map(|material| self.picture(material)).unwrap_or_default();
+        let Some(accessor) = primitive.attributes.coordinates(picture.set) else { return };
         let Some(entry) = self.place(accessor, vertices.1) else { return };
         self.corners.resize(before, Texture::NONE);
         self.corners.extend(corners.iter().map(|&corner| corner - vertices.0 + entry));
-        if let Some(image) = texture.and_then(|texture| self.image(&texture)) {
+        if let Some(image) = picture.image {
             self.polygon_images.resize(before / 3, Texture::NONE);
             self.polygon_images.resize((before + corners.len()) / 3, image);
         }
+    }
+
+    /// The picture of a material, looked for when first named.
+    fn picture(&mut self, material: usize) -> Picture {
+        if let Some(&known) = self.pictures.get(&material) {
+            return known;
+        }
+        let texture = self.base_colour(material).map_err(|fault| self.warn(fault)).ok().flatten();
+        let picture = texture.map_or(Picture::default(), |texture| Picture {
+            set: texture.tex_coord,
+            image: self.image(&texture),
+        });
+        self.pictures.insert(material, picture);
+        picture
     }
 
     fn base_colour(&self, material: usize) -> Result<Option<TextureReference>, Fault> {

@@ -99,6 +99,7 @@ fn vertices_are_found_on_their_mesh() {
     assert!(on("99999999999999999999", &square()).unwrap_err().contains("line 1: holds"));
     assert!(on("1\n1.0 2.0 3.0", &square()).unwrap_err().contains("line 2: holds `1.0 2.0 3.0`"));
     assert!(complaint("3").contains("need the mesh"));
+    assert!(complaint(&"0\n".repeat(20_000)).contains("line 10001: is entry 10001"));
     let names = LandmarkFile::parse(text.as_bytes()).unwrap();
     assert_eq!(names.present().collect::<Vec<_>>(), ["0", "2"]);
 }

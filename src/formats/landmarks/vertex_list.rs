@@ -2,6 +2,9 @@ use super::{LandmarkFile, Mark};
 use crate::formats::error::Fault;
 use crate::formats::text::{Lines, integer, shown};
 
+/// Landmarks are few: a longer list is another file, and would take many times its bytes in memory.
+const MOST: usize = 10_000;
+
 /// One vertex index a line.
 pub(super) fn read(text: &[u8]) -> Result<LandmarkFile, Fault> {
     let mut file = LandmarkFile { listed: true, ..LandmarkFile::default() };
@@ -12,6 +15,10 @@ pub(super) fn read(text: &[u8]) -> Result<LandmarkFile, Fault> {
             b"null" => None,
             entry => Some(vertex(entry, line.number)?),
         };
+        if file.names.len() == MOST {
+            let problem = format!("is entry {}: a list of landmarks has at most {MOST}", MOST + 1);
+            return Err(Fault::at(format_args!("line {}", line.number), problem));
+        }
         file.push(file.names.len().to_string(), mark);
     }
     Ok(file)
