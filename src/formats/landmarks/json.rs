@@ -15,15 +15,13 @@ pub(super) fn read(bytes: &[u8]) -> Result<LandmarkFile, Fault> {
     let mut file = LandmarkFile::default();
     match Members::of(document) {
         Some(members) => match members.get("markups") {
-            Some(markups) => slicer::read(markups),
-            None => read_object(members, DEEPEST, &mut file).map(|()| file),
+            Some(markups) => return slicer::read(markups),
+            None => read_object(members, DEEPEST, &mut file)?,
         },
-        None => read_list(document, &mut file).map(|()| file),
+        None => read_list(document, &mut file)?,
     }
-    .map(|mut file| {
-        file.maybe_on_triangles = may_be_on_triangles(document);
-        file
-    })
+    file.maybe_on_triangles = may_be_on_triangles(document);
+    Ok(file)
 }
 
 /// Says where JSON ends and quotes it: a program that writes `NaN` does not say which landmark is wrong, this does.
