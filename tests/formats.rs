@@ -9,8 +9,8 @@ use std::time::{Duration, Instant};
 
 use glam::DVec3;
 use onemesh::formats::{
-    Collection, Glb, MeshFormat, Region, Scheme, glb_bytes, obj_bytes, parse_mesh, ply_bytes, read_landmarks,
-    read_mesh,
+    Collection, Glb, MeshFile, MeshFormat, Region, Scheme, TextureImage, glb_bytes, obj_bytes, parse_mesh,
+    ply_bytes, read_landmarks, read_mesh,
 };
 use onemesh::mesh::TriangleMesh;
 
@@ -60,6 +60,14 @@ fn a_textured_obj_and_its_ljson_are_read() {
     let mesh = read_mesh(folder.join("james.obj")).unwrap();
     assert_eq!((mesh.positions().len(), mesh.triangles().len()), (6393, 12228));
     assert_eq!(read_landmarks(folder.join("james.ljson")).unwrap().present().count(), 68);
+    let file = MeshFile::read(folder.join("james.obj")).unwrap();
+    assert_eq!(file.warnings, [""; 0]);
+    let texture = file.texture.unwrap();
+    assert_eq!(texture.images, [TextureImage::File(folder.join("james.jpg"))]);
+    assert!((0..file.polygons.len()).all(|polygon| texture.image(polygon).is_some()));
+    assert!((0..file.polygons.corners().len()).all(|corner| texture.coordinate(corner).is_some()));
+    let coloured = MeshFile::read(folder.join("template.ply")).unwrap();
+    assert_eq!(coloured.colours.unwrap().len(), coloured.mesh.positions().len());
 }
 
 #[test]

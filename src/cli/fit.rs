@@ -14,7 +14,7 @@ use super::progress::ProgressBars;
 /// Fits the template to one scan, without landmarks, and prints how closely it lies.
 #[derive(Debug, clap::Args)]
 pub struct Fit {
-    /// The scan: OBJ, PLY, glTF or GLB
+    /// The scan: OBJ, PLY, STL, glTF or GLB
     scan: PathBuf,
     /// The GLB to write
     #[arg(short, long, value_name = "FILE")]

@@ -23,7 +23,7 @@ pub enum Fault {
     Unwritable(io::Error),
     /// Neither content nor extension tell a mesh format.
     #[error(
-        "is neither OBJ, PLY, glTF nor GLB (it begins with `{start}`): convert the mesh to one of them, \
+        "is neither OBJ, PLY, STL, glTF nor GLB (it begins with `{start}`): convert the mesh to one of them, \
          or correct the file's extension"
     )]
     UnknownFormat {

@@ -1,41 +1,40 @@
 use glam::DVec3;
 
-/// What a reader finds, before it is checked to be a mesh. Colours and texture coordinates will be optional fields here.
+use super::polygons::Polygons;
+use super::texture::Texture;
+
+/// What a reader finds, before it is checked to be a mesh.
 #[derive(Debug, Default)]
 pub(super) struct Geometry {
     /// `[N, 3]`
     pub positions: Vec<DVec3>,
-    /// `[F, 3]`
-    pub triangles: Vec<[u32; 3]>,
+    pub polygons: Polygons,
+    /// `[N, 4]`: red, green, blue, opacity.
+    pub colours: Option<Vec<[u8; 4]>>,
+    pub texture: Option<Texture>,
+    pub order: FileOrder,
+    /// What is there but could not be used, colours, texture coordinates and pictures among it.
+    pub warnings: Vec<String>,
 }
 
-/// Cuts a polygon into the triangles that its first corner makes with each of its edges.
-#[derive(Default)]
-pub(super) struct Fan {
-    first: Option<u32>,
-    previous: Option<u32>,
+/// Which vertex and triangle of the mesh those of the file have become: landmarks may name them by their numbers.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(super) struct FileOrder {
+    pub vertices: Numbers,
+    pub triangles: Numbers,
 }
 
-impl Fan {
-    /// Takes the polygon's next corner; from the third on, each closes a triangle.
-    pub fn corner(&mut self, index: u32) -> Option<[u32; 3]> {
-        let Some(first) = self.first else {
-            self.first = Some(index);
-            return None;
-        };
-        let previous = self.previous.replace(index)?;
-        Some([first, previous, index])
-    }
+/// From a number in the file to that in the mesh.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(super) enum Numbers {
+    /// The mesh has the file's own.
+    #[default]
+    Kept,
+    /// For each number in the file that in the mesh, or [`GONE`].
+    Changed(Vec<u32>),
+    /// The format numbers nothing.
+    None,
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_polygon_of_n_corners_has_n_minus_2_triangles() {
-        let mut fan = Fan::default();
-        let triangles: Vec<_> = [4, 5, 6, 7, 8].into_iter().filter_map(|i| fan.corner(i)).collect();
-        assert_eq!(triangles, [[4, 5, 6], [4, 6, 7], [4, 7, 8]]);
-    }
-}
+/// What is in the file and not in the mesh.
+pub(super) const GONE: u32 = u32::MAX;

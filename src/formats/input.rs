@@ -53,16 +53,32 @@ impl Siblings {
         Self { folder: None, read: RefCell::default() }
     }
 
-    /// Reads the file called `name`, a path relative to the folder that stays within it.
-    pub fn read(&self, name: &str) -> Result<Vec<u8>, String> {
+    /// Where the file called `name` would be, a path relative to the folder that stays within it.
+    pub fn path(&self, name: &str) -> Result<PathBuf, String> {
         let Some(folder) = &self.folder else {
             return Err(format!("names the file `{name}`, which is not here: embed it, or send a GLB"));
         };
-        let stays_within = Path::new(name).components().all(|part| matches!(part, Component::Normal(_)));
-        if name.is_empty() || name.contains(':') || !stays_within {
-            return Err(format!("names `{name}`: only files in the same folder or beneath it are read"));
+        let parts = Path::new(name).components().filter(|part| *part != Component::CurDir);
+        let inside: Option<PathBuf> =
+            parts.map(|part| matches!(part, Component::Normal(_)).then_some(part)).collect();
+        match inside {
+            Some(inside) if !name.contains(':') && inside != Path::new("") => Ok(folder.join(inside)),
+            _ => Err(format!("names `{name}`: only files in the same folder or beneath it are read")),
         }
-        let path = folder.join(name);
+    }
+
+    /// Where the file called `name` is, which must be there.
+    pub fn find(&self, name: &str) -> Result<PathBuf, String> {
+        let path = self.path(name)?;
+        if path.is_file() {
+            return Ok(path);
+        }
+        Err(format!("names `{name}`, which is not there: put it beside the mesh"))
+    }
+
+    /// Reads the file called `name`.
+    pub fn read(&self, name: &str) -> Result<Vec<u8>, String> {
+        let path = self.path(name)?;
         let bytes = read_file(&path).map_err(|error| format!("names a file that fails: {error}"))?;
         self.read.borrow_mut().push(InputFile::of(&path, &bytes));
         Ok(bytes)

@@ -1,3 +1,4 @@
+use super::stl;
 use super::text::{Lines, without_mark, words};
 
 /// The mesh formats that are read.
@@ -7,13 +8,16 @@ pub enum MeshFormat {
     Obj,
     /// PLY: ascii, binary little-endian or binary big-endian.
     Ply,
+    /// STL: ascii or binary.
+    Stl,
     /// glTF 2.0, as JSON or as a binary container (GLB).
     Gltf,
 }
 
-const EXTENSIONS: [(&str, MeshFormat); 4] = [
+const EXTENSIONS: [(&str, MeshFormat); 5] = [
     ("obj", MeshFormat::Obj),
     ("ply", MeshFormat::Ply),
+    ("stl", MeshFormat::Stl),
     ("glb", MeshFormat::Gltf),
     ("gltf", MeshFormat::Gltf),
 ];
@@ -37,6 +41,8 @@ impl MeshFormat {
             Some(Self::Gltf)
         } else if bytes.starts_with(b"ply\n") || bytes.starts_with(b"ply\r") {
             Some(Self::Ply)
+        } else if stl::looks_like_stl(bytes) {
+            Some(Self::Stl)
         } else {
             looks_like_obj(text).then_some(Self::Obj)
         }
@@ -62,7 +68,12 @@ mod tests {
         assert_eq!(sniff(b"\xEF\xBB\xBF \n{\"asset\"", None), Some(MeshFormat::Gltf));
         assert_eq!(sniff(b"# by hand\n\nv 0 0 0", None), Some(MeshFormat::Obj));
         assert_eq!(sniff(b"cstype bezier", Some("OBJ")), Some(MeshFormat::Obj));
-        assert_eq!(sniff(b"solid cube", Some("stl")), None);
+        assert_eq!(sniff(b"solid cube\n facet normal 0 0 1", Some("obj")), Some(MeshFormat::Stl));
+        let mut binary = b"solid, says a binary file".to_vec();
+        binary.resize(84 + 50, 0);
+        binary[80] = 1;
+        assert_eq!(sniff(&binary, None), Some(MeshFormat::Stl));
+        assert_eq!(sniff(b"solid cube", None), None);
         assert_eq!(sniff(b"", None), None);
     }
 }

@@ -11,14 +11,18 @@ mod glb;
 mod gltf;
 mod input;
 mod landmarks;
+mod mesh_file;
 mod mesh_format;
-#[cfg(test)]
-mod mutation;
+mod numbering;
 mod obj;
 mod output;
 mod ply;
+mod polygons;
 mod scheme;
+mod stl;
 mod text;
+mod texture;
+mod weld;
 
 use std::path::Path;
 
@@ -27,66 +31,30 @@ pub use digest::Sha256;
 pub use error::{Fault, FormatError};
 pub use glb::{Glb, glb_bytes, write_glb};
 pub use input::InputFile;
-pub use landmarks::{landmarks_json, parse_landmarks, read_landmarks, write_landmarks};
+pub use landmarks::{LandmarkFile, landmarks_json, parse_landmarks, read_landmarks, write_landmarks};
+pub use mesh_file::MeshFile;
 pub use mesh_format::MeshFormat;
 pub use obj::{obj_bytes, write_obj};
 pub use output::write_whole;
 pub use ply::{ply_bytes, write_ply};
+pub use polygons::Polygons;
 pub use scheme::{Region, Scheme};
+pub use texture::{ImageOrigin, Texture, TextureImage};
 
 use crate::mesh::TriangleMesh;
-use input::Siblings;
 
-/// Reads the triangle mesh in an OBJ, PLY, glTF or GLB file, in the file's own space and units.
-///
-/// The format is told from the content, and from the file's extension where the content does not say. Polygons become
-/// fans of triangles; polygons of fewer than three corners are left out.
-///
-/// Vertices of OBJ and PLY keep their number and order, also those that no triangle names. glTF repeats a vertex for
-/// each normal and texture coordinate it has, so that its seams are closed again: vertices of open edges in the same
-/// place become one, vertices that no triangle names are dropped, and the others keep their order. Files by
-/// [`write_glb`] are read as they are.
+/// The mesh alone of [`MeshFile::read`].
 ///
 /// # Errors
-/// [`FormatError`] names the file, the line or element, what was found there and what to do.
+/// As [`MeshFile::read`].
 pub fn read_mesh(path: impl AsRef<Path>) -> Result<TriangleMesh, FormatError> {
-    let path = path.as_ref();
-    let siblings = Siblings::of(path);
-    read_with(path, &siblings).map(|(mesh, _)| mesh)
+    MeshFile::read(path).map(|file| file.mesh)
 }
 
-/// Reads a mesh as [`read_mesh`] does, from the bytes of a file of the given format.
+/// The mesh alone of [`MeshFile::parse`].
 ///
 /// # Errors
-/// [`FormatError`] without a file; [`FormatError::in_file`] adds one. A glTF that names other files is refused.
+/// As [`MeshFile::parse`].
 pub fn parse_mesh(bytes: &[u8], format: MeshFormat) -> Result<TriangleMesh, FormatError> {
-    Ok(parse(bytes, format, &Siblings::none())?)
-}
-
-/// The mesh at `path` and the files it was read from, the first of them `path` itself.
-fn read_mesh_and_inputs(path: &Path) -> Result<(TriangleMesh, Vec<InputFile>), FormatError> {
-    let siblings = Siblings::of(path);
-    let (mesh, bytes) = read_with(path, &siblings)?;
-    let mut inputs = vec![InputFile::of(path, &bytes)];
-    inputs.extend(siblings.into_read());
-    Ok((mesh, inputs))
-}
-
-fn read_with(path: &Path, siblings: &Siblings) -> Result<(TriangleMesh, Vec<u8>), FormatError> {
-    let bytes = input::read_file(path)?;
-    let extension = path.extension().and_then(|e| e.to_str());
-    let mesh = match MeshFormat::sniff(&bytes, extension) {
-        Some(format) => parse(&bytes, format, siblings),
-        None => Err(Fault::UnknownFormat { start: text::shown(&bytes) }),
-    };
-    mesh.map(|mesh| (mesh, bytes)).map_err(|fault| FormatError::from(fault).in_file(path))
-}
-
-fn parse(bytes: &[u8], format: MeshFormat, siblings: &Siblings) -> Result<TriangleMesh, Fault> {
-    let geometry = match format {
-        MeshFormat::Obj => obj::read(bytes),
-        MeshFormat::Ply => ply::read(bytes),
-        MeshFormat::Gltf => gltf::read(bytes, siblings),
-    }?;
-    Ok(TriangleMesh::new(geometry.positions, geometry.triangles)?)
+    MeshFile::parse(bytes, format).map(|file| file.mesh)
 }

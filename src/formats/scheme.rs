@@ -4,6 +4,7 @@ use std::ops::RangeInclusive;
 
 use glam::DVec3;
 
+use super::numbering::Numbering;
 use crate::mesh::LandmarkSet;
 
 /// A part of the face; right and left are the face's own.
@@ -29,12 +30,11 @@ pub enum Region {
     InnerLips,
 }
 
-/// A numbering of facial landmarks whose meaning is known. Its landmarks are named by their indices "0", "1", ...
+/// Facial landmarks whose meaning is known, named by their indices "0", "1", ...
 #[derive(Debug)]
 pub struct Scheme {
     /// The name that it is stored by.
     pub name: &'static str,
-    aliases: &'static [&'static str],
     nose_tip: usize,
     /// Each landmark's counterpart on the other half of the face; itself on the midline.
     mirror: &'static [usize],
@@ -46,7 +46,6 @@ static KNOWN: [Scheme; 1] = [MULTIPIE_68];
 /// The 68 points of Multi-PIE, used by iBUG's 300-W and by dlib.
 const MULTIPIE_68: Scheme = Scheme {
     name: "multipie68",
-    aliases: &["ibug68", "300w", "dlib68"],
     nose_tip: 30,
     #[rustfmt::skip]
     mirror: &[
@@ -71,12 +70,10 @@ const MULTIPIE_68: Scheme = Scheme {
 };
 
 impl Scheme {
-    /// The scheme that goes by this name (in any case), if it is known.
+    /// The scheme that goes by this name (in any case), if it is known; a subset's name gives the whole.
     pub fn named(name: &str) -> Option<&'static Self> {
-        let goes_by = |scheme: &Self| {
-            std::iter::once(&scheme.name).chain(scheme.aliases).any(|known| known.eq_ignore_ascii_case(name))
-        };
-        KNOWN.iter().find(|scheme| goes_by(scheme))
+        let numbering = Numbering::named(name)?;
+        KNOWN.iter().find(|scheme| scheme.name == numbering.scheme)
     }
 
     /// The number of its landmarks.
@@ -113,20 +110,6 @@ impl Scheme {
         (count > 0).then(|| sum / f64::from(count))
     }
 
-    /// Whether the scheme has all of the set's names.
-    pub(super) fn check(&self, set: &LandmarkSet) -> Result<(), String> {
-        match set.names.iter().find(|name| self.index(name).is_none()) {
-            Some(stranger) => {
-                let last = self.count() - 1;
-                Err(format!(
-                    "include `{stranger}`, but those of the scheme {} are named 0 to {last}",
-                    self.name
-                ))
-            }
-            None => Ok(()),
-        }
-    }
-
     fn index(&self, landmark: &str) -> Option<usize> {
         let index: usize = landmark.parse().ok()?;
         // "007" and "+7" are other names.
@@ -145,7 +128,8 @@ mod tests {
     #[test]
     fn goes_by_several_names() {
         assert!(std::ptr::eq(Scheme::named("iBUG68").unwrap(), multipie()));
-        assert!(Scheme::named("wflw98").is_none());
+        assert!(std::ptr::eq(Scheme::named("multipie49").unwrap(), multipie()));
+        assert!(Scheme::named("wflw98").is_none() && Scheme::named("caricshop38").is_none());
     }
 
     #[test]

@@ -3,6 +3,7 @@
 mod clock;
 mod kernels;
 mod memory;
+mod readers;
 mod stages;
 
 use std::path::PathBuf;
@@ -38,6 +39,8 @@ pub struct Bench {
 enum Part {
     /// Solves, orderings, factors, nearest points, the parts of an iteration
     Kernels,
+    /// Reading a mesh in each format
+    Readers,
     /// One scan with the `default` preset
     Fits,
     /// One scan with the `paper` preset
@@ -65,6 +68,9 @@ impl Bench {
         for (name, scan) in scans_of(&scans, sculpted)? {
             if self.does(Part::Kernels) {
                 kernels::nearest_points(&clock, &name, &scan);
+            }
+            if self.does(Part::Readers) {
+                readers::readers(&clock, &name, &scan)?;
             }
             if self.does(Part::Fits) {
                 stages::fits(&clock, &name, &scan, finest)?;

@@ -3,7 +3,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use super::{CollectionError, Source};
-use crate::formats::MeshFormat;
+use crate::formats::{LandmarkFile, MeshFormat};
 
 /// The scans in a folder, in folders of their own or side by side.
 pub(super) fn sources(folder: &Path) -> Result<Vec<Source>, CollectionError> {
@@ -11,19 +11,33 @@ pub(super) fn sources(folder: &Path) -> Result<Vec<Source>, CollectionError> {
     for path in entries(folder)? {
         if path.is_dir() {
             if let Some(mesh) = scan_in(&path)? {
-                sources.push(Source {
-                    name: file_name(&path)?,
-                    mesh,
-                    landmarks: path.join("landmarks.json"),
-                });
+                sources.push(source(file_name(&path)?, mesh, &path.join("landmarks"))?);
             }
         } else if is_mesh(&path) {
             let name = stem(&path)?;
-            let landmarks = folder.join(format!("{name}.landmarks.json"));
-            sources.push(Source { name, mesh: path, landmarks });
+            let landmarks = folder.join(format!("{name}.landmarks"));
+            sources.push(source(name, path, &landmarks)?);
         }
     }
     Ok(sources)
+}
+
+/// A scan whose landmarks' file is called as `landmarks`, with an extension; where there is none, the first is missed.
+fn source(name: String, mesh: PathBuf, landmarks: &Path) -> Result<Source, CollectionError> {
+    let with = |extension: &str| {
+        let mut path = landmarks.as_os_str().to_owned();
+        path.push(".");
+        path.push(extension);
+        PathBuf::from(path)
+    };
+    let mut there: Vec<_> =
+        LandmarkFile::EXTENSIONS.map(with).into_iter().filter(|path| path.exists()).collect();
+    if there.len() > 1 {
+        let files = there.iter().map(|path| file_name(path)).collect::<Result<_, _>>()?;
+        return Err(CollectionError::SeveralLandmarks { name, files });
+    }
+    let landmarks = there.pop().unwrap_or_else(|| with(LandmarkFile::EXTENSIONS[0]));
+    Ok(Source { name, mesh, landmarks, scheme: None })
 }
 
 /// The mesh in a scan's folder: that called `scan`, or the only one.

@@ -7,6 +7,7 @@ use crate::formats::input::read_regular;
 
 #[derive(Deserialize)]
 struct Manifest {
+    scheme: Option<String>,
     scans: Vec<Entry>,
 }
 
@@ -15,19 +16,21 @@ struct Entry {
     name: String,
     mesh: PathBuf,
     landmarks: PathBuf,
+    scheme: Option<String>,
 }
 
 /// The scans that a manifest lists.
 pub(super) fn sources(path: &Path) -> Result<Vec<Source>, CollectionError> {
     let bytes =
         read_regular(path).map_err(|error| CollectionError::Unreadable { path: path.to_owned(), error })?;
-    let manifest: Manifest = serde_json::from_slice(&bytes)
+    let Manifest { scheme, scans } = serde_json::from_slice(&bytes)
         .map_err(|error| CollectionError::Manifest { path: path.to_owned(), problem: error.to_string() })?;
     let folder = path.parent().unwrap_or(Path::new(""));
     let source = |entry: Entry| Source {
         name: entry.name,
         mesh: folder.join(entry.mesh),
         landmarks: folder.join(entry.landmarks),
+        scheme: entry.scheme.or_else(|| scheme.clone()),
     };
-    Ok(manifest.scans.into_iter().map(source).collect())
+    Ok(scans.into_iter().map(source).collect())
 }

@@ -1,18 +1,19 @@
 //! Collections: the scans that are registered together, from a folder or from a manifest.
 
+mod error;
 mod folder;
 mod manifest;
 #[cfg(test)]
 mod tests;
 
 use std::collections::BTreeSet;
-use std::io;
 use std::path::{Path, PathBuf};
 
-use super::error::FormatError;
 use super::input::{InputFile, read_file};
-use super::{Scheme, parse_landmarks, read_mesh_and_inputs};
+use super::landmarks::LandmarkFile;
+use super::mesh_file::MeshFile;
 use crate::mesh::{LandmarkSet, TriangleMesh};
+pub use error::CollectionError;
 
 /// Scans with their landmarks, sorted by name; at least one landmark is present on all of them.
 #[derive(Debug, Clone)]
@@ -29,8 +30,8 @@ pub struct Member {
     pub mesh: PathBuf,
     /// The landmarks' file.
     pub landmarks_file: InputFile,
-    /// The landmarks.
-    pub landmarks: LandmarkSet,
+    /// The landmarks, perhaps by vertices or triangles of the mesh.
+    pub landmarks: LandmarkFile,
 }
 
 /// A scan that has been read whole.
@@ -46,123 +47,23 @@ pub struct Scan {
     pub inputs: Vec<InputFile>,
 }
 
-/// Why a folder or manifest makes no collection.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum CollectionError {
-    /// The folder cannot be listed, or neither folder nor manifest is there.
-    #[error("{}: cannot be read: {error}", path.display())]
-    Unreadable {
-        /// The folder.
-        path: PathBuf,
-        /// What the system says.
-        error: io::Error,
-    },
-    /// The manifest is malformed.
-    #[error("{}: is no manifest {{\"scans\": [{{\"name\", \"mesh\", \"landmarks\"}}, ...]}}: {problem}", path.display())]
-    Manifest {
-        /// The manifest.
-        path: PathBuf,
-        /// What is wrong.
-        problem: String,
-    },
-    /// No scan is there.
-    #[error("{}: holds no scan: expected NAME/scan.ply with NAME/landmarks.json, or NAME.ply with NAME.landmarks.json \
-             (ply, obj, glb or gltf)", path.display())]
-    Empty {
-        /// The folder or manifest.
-        path: PathBuf,
-    },
-    /// A folder holds several meshes and does not say which is the scan.
-    #[error("{}: holds several meshes ({}): name the one to use `scan`", path.display(), meshes.join(", "))]
-    Ambiguous {
-        /// The scan's folder.
-        path: PathBuf,
-        /// The meshes' file names.
-        meshes: Vec<String>,
-    },
-    /// A scan has no landmarks.
-    #[error("scan `{name}` has no landmarks: expected {}", expected.display())]
-    MissingLandmarks {
-        /// The scan.
-        name: String,
-        /// Where they should be.
-        expected: PathBuf,
-    },
-    /// The mesh that a manifest names is not there.
-    #[error("scan `{name}` has no mesh: {} does not exist", path.display())]
-    MissingMesh {
-        /// The scan.
-        name: String,
-        /// Where it should be.
-        path: PathBuf,
-    },
-    /// A name cannot name a result's file.
-    #[error("the scan name `{}` must not be empty, begin with a dot, or contain /, \\, : or control characters", name.escape_default())]
-    BadName {
-        /// The name.
-        name: String,
-    },
-    /// Two scans have one name.
-    #[error("two scans are named `{name}`: {} and {}", first.display(), second.display())]
-    DuplicateName {
-        /// The name.
-        name: String,
-        /// The first scan's mesh.
-        first: PathBuf,
-        /// The second scan's mesh.
-        second: PathBuf,
-    },
-    /// Two scans' landmarks are named by different schemes, so that equal names mean different points.
-    #[error(
-        "the landmarks of `{first}` are of the scheme `{first_scheme}`, those of `{second}` of `{second_scheme}`: use one"
-    )]
-    SchemesDiffer {
-        /// A scan.
-        first: String,
-        /// Its scheme.
-        first_scheme: String,
-        /// Another scan.
-        second: String,
-        /// Its scheme.
-        second_scheme: String,
-    },
-    /// The scans share no landmark.
-    #[error(
-        "no landmark is present on every scan: `{name}` has {there}, none of which all scans before it have ({before})"
-    )]
-    NoCommonLandmark {
-        /// The first scan, by name, that shares none with those before it.
-        name: String,
-        /// Some of its landmarks.
-        there: String,
-        /// Some that the scans before it share.
-        before: String,
-    },
-    /// A file of a scan cannot be read.
-    #[error("scan `{name}`: {error}")]
-    Scan {
-        /// The scan.
-        name: String,
-        /// What is wrong, and in which file.
-        error: FormatError,
-    },
-}
-
 /// Where a scan's files are.
 struct Source {
     name: String,
     mesh: PathBuf,
     landmarks: PathBuf,
+    /// What the landmarks are called, if their own file does not say.
+    scheme: Option<String>,
 }
 
 impl Collection {
     /// Opens a folder of scans or a JSON manifest, and reads all landmarks. Meshes are read by [`Member::read`].
     ///
     /// A folder holds `NAME/scan.ply` with `NAME/landmarks.json`, or `NAME.ply` with `NAME.landmarks.json`, where the
-    /// mesh may also be OBJ, GLB or glTF; of several meshes in `NAME/`, that called `scan` is taken. Folders without a
-    /// mesh and names that begin with a dot are passed over. A manifest is
-    /// `{"scans": [{"name": "...", "mesh": "path", "landmarks": "path"}, ...]}`, paths relative to its folder.
+    /// mesh may also be OBJ, STL, GLB or glTF, and the landmarks any of [`LandmarkFile::EXTENSIONS`]; of several meshes
+    /// in `NAME/`, that called `scan` is taken. Folders without a mesh and names that begin with a dot are passed over.
+    /// A manifest is `{"scans": [{"name": "...", "mesh": "path", "landmarks": "path"}, ...]}`, paths relative to its
+    /// folder; its `"scheme"`, or that of a scan, is for landmarks whose own file states none.
     ///
     /// # Errors
     /// [`CollectionError`] names the scan or the file, and what was expected.
@@ -187,20 +88,20 @@ impl Collection {
 
     /// The names of the landmarks that are present on every scan, in the order of the first scan.
     pub fn common_landmarks(&self) -> Vec<&str> {
-        let first = self.members[0].landmarks.present().map(|(name, _)| name);
+        let first = self.members[0].landmarks.present();
         let common = common_names(&self.members).unwrap_or_default();
         first.filter(|name| common.contains(name)).collect()
     }
 
     /// The landmark scheme that the scans state, if any does.
     pub fn scheme(&self) -> Option<&str> {
-        self.members.iter().find_map(|member| member.landmarks.scheme.as_deref())
+        self.members.iter().find_map(|member| member.landmarks.scheme())
     }
 }
 
 impl Member {
     fn open(source: Source) -> Result<Self, CollectionError> {
-        let Source { name, mesh, landmarks: file } = source;
+        let Source { name, mesh, landmarks: file, scheme } = source;
         if !mesh.exists() {
             return Err(CollectionError::MissingMesh { name, path: mesh });
         }
@@ -209,8 +110,11 @@ impl Member {
         }
         let read = || {
             let bytes = read_file(&file)?;
-            let landmarks = parse_landmarks(&bytes).map_err(|error| error.in_file(&file))?;
-            Ok((InputFile::of(&file, &bytes), landmarks))
+            let landmarks = LandmarkFile::parse(&bytes).and_then(|landmarks| match &scheme {
+                Some(scheme) => landmarks.or_scheme(scheme),
+                None => Ok(landmarks),
+            });
+            Ok((InputFile::of(&file, &bytes), landmarks.map_err(|error| error.in_file(&file))?))
         };
         match read() {
             Ok((landmarks_file, landmarks)) => Ok(Self { name, mesh, landmarks_file, landmarks }),
@@ -218,15 +122,17 @@ impl Member {
         }
     }
 
-    /// Reads the scan's mesh.
+    /// Reads the scan's mesh, and finds the landmarks on it.
     ///
     /// # Errors
     /// [`CollectionError::Scan`] with the file and what is wrong in it.
     pub fn read(&self) -> Result<Scan, CollectionError> {
-        let (mesh, mut inputs) = read_mesh_and_inputs(&self.mesh)
-            .map_err(|error| CollectionError::Scan { name: self.name.clone(), error })?;
+        let failed = |error| CollectionError::Scan { name: self.name.clone(), error };
+        let (file, mut inputs) = MeshFile::read_with_inputs(&self.mesh).map_err(failed)?;
+        let landmarks = self.landmarks.on(&file);
+        let landmarks = landmarks.map_err(|error| failed(error.in_file(&self.landmarks_file.path)))?;
         inputs.push(self.landmarks_file.clone());
-        Ok(Scan { name: self.name.clone(), mesh, landmarks: self.landmarks.clone(), inputs })
+        Ok(Scan { name: self.name.clone(), mesh: file.mesh, landmarks, inputs })
     }
 }
 
@@ -250,12 +156,12 @@ fn check_names(sources: &[Source]) -> Result<(), CollectionError> {
 }
 
 fn check_schemes(members: &[Member]) -> Result<(), CollectionError> {
-    let known = |name: &str| Scheme::named(name).map_or(name.to_owned(), |scheme| scheme.name.to_owned());
-    let mut stated = members.iter().filter_map(|member| Some((member, member.landmarks.scheme.as_deref()?)));
+    // Subsets of a scheme state the whole.
+    let mut stated = members.iter().filter_map(|member| Some((member, member.landmarks.scheme()?)));
     let Some((first, first_scheme)) = stated.next() else {
         return Ok(());
     };
-    match stated.find(|(_, scheme)| known(scheme) != known(first_scheme)) {
+    match stated.find(|(_, scheme)| scheme != &first_scheme) {
         Some((second, second_scheme)) => Err(CollectionError::SchemesDiffer {
             first: first.name.clone(),
             first_scheme: first_scheme.to_owned(),
@@ -288,7 +194,7 @@ fn common_names(members: &[Member]) -> Result<BTreeSet<&str>, (&Member, BTreeSet
 }
 
 fn present_names(member: &Member) -> BTreeSet<&str> {
-    member.landmarks.present().map(|(name, _)| name).collect()
+    member.landmarks.present().collect()
 }
 
 fn some_of(names: &BTreeSet<&str>) -> String {

@@ -133,7 +133,7 @@ fn landmarks_must_meet() {
     let apart = marks(POINTS, r#"{"c": [1, 2, 3], "d": [1, 2, 3]}"#);
     assert!(apart.contains("`b` has `c`, `d`, none of which all scans before it have (`a`, `b`)"), "{apart}");
     let schemes = marks(r#"{"scheme": "own", "a": [0, 0, 0]}"#, r#"{"scheme": "ibug68", "1": [0, 0, 0]}"#);
-    assert!(schemes.contains("`own`") && schemes.contains("`ibug68`"), "{schemes}");
+    assert!(schemes.contains("`own`") && schemes.contains("`multipie68`"), "{schemes}");
     let alias = folder(&[
         ("a.obj", OBJ),
         ("a.landmarks.json", r#"{"scheme": "multipie68", "1": [0, 0, 0]}"#),
@@ -165,4 +165,60 @@ fn manifests_are_checked() {
     }
     let twice = open(&format!(r#"{{"scans": [{}, {}]}}"#, scan("a"), scan("a")));
     assert!(matches!(twice, Err(CollectionError::DuplicateName { .. })));
+}
+
+#[test]
+fn landmarks_of_every_kind_are_found() {
+    let picked = r#"<PickedPoints><point name="a" x="0" y="0" z="0"/></PickedPoints>"#;
+    let markups = r#"{"markups": [{"controlPoints": [{"label": "a", "position": [0, 0, 0]}]}]}"#;
+    let folder = folder(&[
+        ("amy.obj", OBJ),
+        ("amy.landmarks.pp", picked),
+        ("bob/scan.obj", OBJ),
+        ("bob/landmarks.mrk.json", markups),
+        ("cleo.stl", "solid\nfacet\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendfacet\nendsolid\n"),
+        ("cleo.landmarks.ljson", r#"{"landmarks": {"a": [0, 0, 0]}}"#),
+    ]);
+    let collection = Collection::open(folder.path()).unwrap();
+    assert_eq!(names(&collection), ["amy", "bob", "cleo"]);
+    assert_eq!(collection.common_landmarks(), ["a"]);
+    let several =
+        refusal(&[("a.obj", OBJ), ("a.landmarks.json", POINTS), ("a.landmarks.txt", "0")]).to_string();
+    assert!(
+        several.contains("`a` has several files of landmarks (a.landmarks.json, a.landmarks.txt)"),
+        "{several}"
+    );
+}
+
+#[test]
+fn vertex_landmarks_are_resolved_with_the_mesh() {
+    let folder = folder(&[
+        ("a.obj", OBJ),
+        ("a.landmarks.txt", "2\n1\n"),
+        ("b.obj", OBJ),
+        ("b.landmarks.txt", "0\n7\n"),
+    ]);
+    let collection = Collection::open(folder.path()).unwrap();
+    let scan = collection.members()[0].read().unwrap();
+    assert_eq!(scan.landmarks.get("0"), Some(glam::DVec3::Y));
+    let error = collection.members()[1].read().unwrap_err().to_string();
+    assert!(
+        error.contains("scan `b`") && error.contains("b.landmarks.txt: line 2: names vertex 7"),
+        "{error}"
+    );
+}
+
+#[test]
+fn a_manifest_states_schemes() {
+    let list = |count: usize| format!("[{}]", vec!["[0, 0, 0]"; count].join(","));
+    let manifest = r#"{"scheme": "ibug68", "scans": [
+        {"name": "a", "mesh": "a.obj", "landmarks": "68.json"},
+        {"name": "b", "mesh": "a.obj", "landmarks": "51.json", "scheme": "ibug51"}]}"#;
+    let folder =
+        folder(&[("m.json", manifest), ("a.obj", OBJ), ("68.json", &list(68)), ("51.json", &list(51))]);
+    let collection = Collection::open(folder.path().join("m.json")).unwrap();
+    assert_eq!((collection.common_landmarks().len(), collection.scheme()), (51, Some("multipie68")));
+    std::fs::write(folder.path().join("51.json"), list(50)).unwrap();
+    let error = Collection::open(folder.path().join("m.json")).unwrap_err().to_string();
+    assert!(error.contains("51.json: the landmarks: are 50, but multipie51 has 51"), "{error}");
 }

@@ -1,4 +1,4 @@
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 use super::buffer::Buffers;
 use super::document::{Accessor, Sparse};
@@ -23,6 +23,36 @@ pub(super) fn positions(buffers: &Buffers, index: usize) -> Result<Vec<DVec3>, F
         }
         None => Ok(positions),
     }
+}
+
+/// Texture coordinates `[N, 2]` that accessor `index` holds, integers scaled to [0, 1] where it says that they are.
+pub(super) fn coordinates(buffers: &Buffers, index: usize) -> Result<Vec<DVec2>, Fault> {
+    let place = format!("accessors[{index}]");
+    let accessor = buffers.document().accessor(index)?;
+    expect_shape(&accessor, "VEC2", &place)?;
+    let component = Component::coded(accessor.component_type, &place)?;
+    let unit = if accessor.normalized { component.unit() } else { 1.0 };
+    let decode = |bytes: &[u8]| DVec2::from([0, 1].map(|axis| component.decode(bytes, axis) / unit));
+    let coordinates = values(&accessor, buffers, Item { component, width: 2 }, &place, decode)?;
+    match coordinates.iter().find(|coordinate| !coordinate.is_finite()) {
+        Some(wrong) => Err(Fault::at(place, format!("holds {wrong}, which must be finite numbers"))),
+        None => Ok(coordinates),
+    }
+}
+
+/// Colours `[N, 4]` that accessor `index` holds, opaque where it has no opacity.
+pub(super) fn colours(buffers: &Buffers, index: usize) -> Result<Vec<[u8; 4]>, Fault> {
+    let place = format!("accessors[{index}]");
+    let accessor = buffers.document().accessor(index)?;
+    let width = match accessor.shape.as_str() {
+        "VEC3" => 3,
+        "VEC4" => 4,
+        other => return Err(Fault::at(place, format!("is of type {other}, where VEC3 or VEC4 is needed"))),
+    };
+    let component = Component::coded(accessor.component_type, &place)?;
+    let channel = |bytes: &[u8], at| (component.decode(bytes, at) / component.unit() * 255.0).round() as u8;
+    let decode = |bytes: &[u8]| [0, 1, 2, 3].map(|at| if at < width { channel(bytes, at) } else { 255 });
+    values(&accessor, buffers, Item { component, width }, &place, decode)
 }
 
 /// Vertex indices `[K]` that accessor `index` holds.
@@ -191,16 +221,24 @@ impl Component {
         }
     }
 
-    /// Scales integers to [-1, 1] or [0, 1].
-    fn normalize(self, stored: DVec3) -> DVec3 {
+    /// What stands for 1 where integers are scaled to [-1, 1] or [0, 1].
+    fn unit(self) -> f64 {
         let largest: i32 = match self {
             Self::I8 => i8::MAX.into(),
             Self::U8 => u8::MAX.into(),
             Self::I16 => i16::MAX.into(),
             Self::U16 => u16::MAX.into(),
-            Self::U32 | Self::F32 => return stored,
+            Self::U32 | Self::F32 => 1,
         };
-        (stored / f64::from(largest)).max(DVec3::NEG_ONE)
+        f64::from(largest)
+    }
+
+    /// Scales integers to it, where the least too becomes -1.
+    fn normalize(self, stored: DVec3) -> DVec3 {
+        match self {
+            Self::U32 | Self::F32 => stored,
+            _ => (stored / self.unit()).max(DVec3::NEG_ONE),
+        }
     }
 
     /// Component `axis` of an item.

@@ -47,6 +47,15 @@ impl<'a> Buffers<'a> {
         self.document
     }
 
+    /// Bytes of the file and of those beside it that were read.
+    pub fn held(&self) -> usize {
+        self.held.get()
+    }
+
+    pub fn siblings(&self) -> &'a Siblings {
+        self.siblings
+    }
+
     /// Counts `values` towards what the file may unfold to. A file that has its own bytes for each vertex and index
     /// always stays within that; one that repeats a mesh without end, or has values without bytes, does not.
     pub fn unfold(&self, values: usize, place: &str) -> Result<(), Fault> {
@@ -120,10 +129,7 @@ impl<'a> Buffers<'a> {
 
     fn resolve(&self, uri: &str) -> Result<Vec<u8>, String> {
         if let Some(data) = uri.strip_prefix("data:") {
-            let encoded = data.split_once(";base64,").map(|(_, encoded)| encoded);
-            let encoded = encoded
-                .ok_or_else(|| format!("has the uri `{}`, which is not base64", shown(uri.as_bytes())))?;
-            return BASE64.decode(encoded).map_err(|error| format!("is no valid base64: {error}"));
+            return embedded(data).map(|(_, bytes)| bytes);
         }
         let bytes = self.siblings.read(&percent_decoded(uri)?)?;
         self.held.set(self.held.get().saturating_add(bytes.len()));
@@ -131,8 +137,17 @@ impl<'a> Buffers<'a> {
     }
 }
 
+/// What a uri holds that begins with `data:`: the type it states, and the bytes.
+pub(super) fn embedded(data: &str) -> Result<(&str, Vec<u8>), String> {
+    let (media_type, encoded) = data
+        .split_once(";base64,")
+        .ok_or_else(|| format!("has the uri `data:{}`, which is not base64", shown(data.as_bytes())))?;
+    let bytes = BASE64.decode(encoded).map_err(|error| format!("is no valid base64: {error}"))?;
+    Ok((media_type, bytes))
+}
+
 /// A uri's file name, its `%20` and the like made plain.
-fn percent_decoded(uri: &str) -> Result<String, String> {
+pub(super) fn percent_decoded(uri: &str) -> Result<String, String> {
     let unreadable = || format!("has the uri `{}`, which cannot be read", shown(uri.as_bytes()));
     let mut name = Vec::with_capacity(uri.len());
     let mut rest = uri.as_bytes();

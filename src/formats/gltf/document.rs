@@ -25,6 +25,12 @@ pub(super) struct Document<'a> {
     buffer_views: Vec<&'a RawValue>,
     #[serde(borrow, default)]
     buffers: Vec<&'a RawValue>,
+    #[serde(borrow, default)]
+    materials: Vec<&'a RawValue>,
+    #[serde(borrow, default)]
+    textures: Vec<&'a RawValue>,
+    #[serde(borrow, default)]
+    images: Vec<&'a RawValue>,
     #[serde(default)]
     extensions_required: Vec<String>,
     /// Bytes of entries that may still be parsed.
@@ -67,6 +73,7 @@ pub(super) struct Mesh {
 pub(super) struct Primitive {
     pub attributes: Attributes,
     pub indices: Option<usize>,
+    pub material: Option<usize>,
     #[serde(default = "triangles")]
     pub mode: u32,
 }
@@ -79,6 +86,58 @@ fn triangles() -> u32 {
 pub(super) struct Attributes {
     #[serde(rename = "POSITION")]
     pub position: Option<usize>,
+    #[serde(rename = "COLOR_0")]
+    pub colour: Option<usize>,
+    #[serde(rename = "TEXCOORD_0")]
+    coordinates_0: Option<usize>,
+    #[serde(rename = "TEXCOORD_1")]
+    coordinates_1: Option<usize>,
+}
+
+impl Attributes {
+    /// The texture coordinates of this set.
+    pub fn coordinates(&self, set: usize) -> Option<usize> {
+        match set {
+            0 => self.coordinates_0,
+            1 => self.coordinates_1,
+            _ => None,
+        }
+    }
+}
+
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct Material {
+    pub pbr_metallic_roughness: Option<BaseColour>,
+}
+
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct BaseColour {
+    pub base_color_texture: Option<TextureReference>,
+}
+
+/// Which texture, on which set of texture coordinates.
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct TextureReference {
+    pub index: usize,
+    #[serde(default)]
+    pub tex_coord: usize,
+    pub extensions: Option<serde::de::IgnoredAny>,
+}
+
+#[derive(Deserialize)]
+pub(super) struct TextureEntry {
+    pub source: Option<usize>,
+}
+
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(super) struct Image {
+    pub uri: Option<String>,
+    pub mime_type: Option<String>,
+    pub buffer_view: Option<usize>,
 }
 
 #[derive(Deserialize)]
@@ -223,6 +282,18 @@ impl<'a> Document<'a> {
 
     pub fn buffer_view(&self, index: usize) -> Result<BufferView<'a>, Fault> {
         self.entry(&self.buffer_views, "bufferViews", index)
+    }
+
+    pub fn material(&self, index: usize) -> Result<Material, Fault> {
+        self.entry(&self.materials, "materials", index)
+    }
+
+    pub fn texture(&self, index: usize) -> Result<TextureEntry, Fault> {
+        self.entry(&self.textures, "textures", index)
+    }
+
+    pub fn image(&self, index: usize) -> Result<Image, Fault> {
+        self.entry(&self.images, "images", index)
     }
 
     pub fn buffer(&self, index: usize) -> Result<Buffer, Fault> {

@@ -6,20 +6,23 @@ mod accessor;
 mod buffer;
 mod container;
 mod document;
+mod image;
 mod scene;
+mod surface;
 #[cfg(test)]
 mod tests;
-mod weld;
 
 use super::error::Fault;
 use super::geometry::Geometry;
 use super::glb;
 use super::input::Siblings;
+use super::weld::weld;
 use buffer::Buffers;
 use container::Container;
 use document::Document;
 
-/// Reads all triangles, strips and fans of the scene, each node's transform applied, and closes their seams.
+/// Reads all triangles, strips and fans of the scene, each node's transform applied, and closes their seams. Colours,
+/// texture coordinates and base colour pictures come along.
 pub(super) fn read(bytes: &[u8], siblings: &Siblings) -> Result<Geometry, Fault> {
     let container = Container::split(bytes)?;
     let document = Document::parse(container.json)?;
@@ -27,5 +30,5 @@ pub(super) fn read(bytes: &[u8], siblings: &Siblings) -> Result<Geometry, Fault>
     let geometry = scene::gather(&buffers)?;
     // What this program wrote has no seams, and its vertex order is what it is kept for.
     let own = document.asset()?.generator.is_some_and(|name| name.starts_with(glb::PROGRAM));
-    Ok(if own { geometry } else { weld::weld(geometry) })
+    Ok(if own { geometry } else { weld(geometry) })
 }

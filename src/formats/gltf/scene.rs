@@ -5,28 +5,37 @@ use glam::{DMat4, DQuat, DVec3};
 use super::accessor;
 use super::buffer::Buffers;
 use super::document::{Node, Primitive};
+use super::surface::Surface;
 use crate::formats::error::Fault;
 use crate::formats::geometry::Geometry;
 
 /// The triangles of the default scene, in its space. A file without nodes has its meshes as they are.
 pub(super) fn gather(buffers: &Buffers) -> Result<Geometry, Fault> {
     let document = buffers.document();
-    let mut gathered = Gathered { buffers, geometry: Geometry::default(), placed: HashMap::new(), others: 0 };
+    let mut gathered = Gathered {
+        buffers,
+        geometry: Geometry::default(),
+        surface: Surface::new(buffers),
+        placed: HashMap::new(),
+        others: 0,
+    };
     if document.node_count() == 0 {
         (0..document.mesh_count()).try_for_each(|mesh| gathered.mesh(mesh, DMat4::IDENTITY))?;
     } else {
         gathered.nodes()?;
     }
-    if gathered.geometry.triangles.is_empty() {
+    if gathered.geometry.polygons.is_empty() {
         let problem = format!("has no triangle ({} primitives of points or lines)", gathered.others);
         return Err(Fault::at("the default scene", problem));
     }
+    gathered.surface.finish(&mut gathered.geometry);
     Ok(gathered.geometry)
 }
 
 struct Gathered<'g, 'a> {
     buffers: &'g Buffers<'a>,
     geometry: Geometry,
+    surface: Surface<'g, 'a>,
     /// First vertex and number of vertices of each accessor under each transform: primitives and meshes often share
     /// their vertices and differ in their indices.
     placed: HashMap<(usize, [u64; 16]), (u32, u32)>,
@@ -90,7 +99,11 @@ impl Gathered<'_, '_> {
             let key = (accessor, transform.to_cols_array().map(f64::to_bits));
             let range = match self.placed.get(&key) {
                 Some(&range) => range,
-                None => self.vertices(accessor, transform)?,
+                None => {
+                    let range = self.vertices(accessor, transform)?;
+                    self.surface.vertices(range, primitive.attributes.colour);
+                    range
+                }
             };
             self.placed.insert(key, range);
             self.primitive(primitive, range, transform.determinant() < 0.0, &place)?;
@@ -130,8 +143,12 @@ impl Gathered<'_, '_> {
             return Err(Fault::at(place, problem));
         }
         let turned = |[a, b, c]: [u32; 3]| if mirrored { [a, c, b] } else { [a, b, c] };
-        let triangles = triangles(primitive.mode, &indices);
-        self.geometry.triangles.extend(triangles.map(|corners| turned(corners.map(|index| first + index))));
+        let polygons = &mut self.geometry.polygons;
+        let before = polygons.corners().len();
+        for corners in triangles(primitive.mode, &indices) {
+            polygons.push_triangle(turned(corners.map(|index| first + index)));
+        }
+        self.surface.triangles(primitive, &polygons.corners()[before..], (first, count), before);
         Ok(())
     }
 }

@@ -47,6 +47,10 @@ impl Rows for AsciiRows<'_> {
         finite(word).ok_or_else(|| format!("holds `{}`, where a finite number must be", shown(word)))
     }
 
+    fn any_number(&mut self, _: Scalar) -> Result<f64, String> {
+        self.word().map(|word| finite(word).unwrap_or(f64::NAN))
+    }
+
     fn integer(&mut self, _: Scalar) -> Result<i64, String> {
         let word = self.word()?;
         integer(word).ok_or_else(|| format!("holds `{}`, where an integer must be", shown(word)))

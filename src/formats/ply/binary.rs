@@ -49,6 +49,10 @@ impl<const BIG: bool> Rows for BinaryRows<'_, BIG> {
         })
     }
 
+    fn any_number(&mut self, scalar: Scalar) -> Result<f64, String> {
+        self.number(scalar)
+    }
+
     fn integer(&mut self, scalar: Scalar) -> Result<i64, String> {
         Ok(match scalar {
             Scalar::I8 => i64::from(i8::from_le_bytes(self.take()?)),

@@ -52,6 +52,8 @@ pub(super) struct Header {
     pub encoding: Encoding,
     /// In the order of their rows.
     pub elements: Vec<Element>,
+    /// The pictures that comments name, as MeshLab writes them.
+    pub pictures: Vec<String>,
     /// Its size in bytes: the rows follow.
     pub length: usize,
     /// Its number of lines.
@@ -100,14 +102,19 @@ impl Header {
         }
         let mut encoding = None;
         let mut elements = Vec::new();
+        let mut pictures = Vec::new();
         while let Some(line) = lines.next() {
             let statement: Vec<_> = words(line.text).collect();
             let outcome = match statement[..] {
+                [b"comment", b"TextureFile", ..] => {
+                    pictures.push(picture(line.text));
+                    Ok(())
+                }
                 [] | [b"comment" | b"obj_info", ..] => Ok(()),
                 [b"end_header"] => {
                     let encoding = encoding.ok_or_else(|| Fault::at("the header", "has no line `format`"))?;
                     let length = bytes.len() - lines.rest().len();
-                    return Ok(Self { encoding, elements, length, lines: line.number });
+                    return Ok(Self { encoding, elements, pictures, length, lines: line.number });
                 }
                 [b"format", name, ..] => read_encoding(name).map(|read| encoding = Some(read)),
                 [b"element", name, count] => read_element(name, count).map(|element| elements.push(element)),
@@ -139,6 +146,14 @@ impl Header {
             }
         }
     }
+}
+
+/// What stands behind `comment TextureFile`, blanks in it included.
+fn picture(comment: &[u8]) -> String {
+    const KEYWORD: &str = "TextureFile";
+    let comment = String::from_utf8_lossy(comment);
+    let name = comment.split_once(KEYWORD).map_or("", |(_, name)| name);
+    name.trim().replace('\\', "/")
 }
 
 fn read_encoding(name: &[u8]) -> Result<Encoding, String> {

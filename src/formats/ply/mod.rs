@@ -3,27 +3,30 @@
 mod ascii;
 mod binary;
 mod body;
+mod faces;
 mod header;
 #[cfg(test)]
 mod tests;
+mod vertices;
 mod writer;
 
 pub use writer::{ply_bytes, write_ply};
 
 use super::error::Fault;
 use super::geometry::Geometry;
+use super::input::Siblings;
 use ascii::AsciiRows;
 use binary::BinaryRows;
 use header::{Encoding, Header};
 
-/// Reads `x`, `y`, `z` of the element `vertex` and the polygons of the element `face`, cut into fans. Other properties
-/// and elements are skipped.
-pub(super) fn read(bytes: &[u8]) -> Result<Geometry, Fault> {
+/// Reads positions, colours and texture coordinates of the element `vertex`, and the polygons of the element `face` with
+/// their texture coordinates. Other properties and elements are skipped.
+pub(super) fn read(bytes: &[u8], siblings: &Siblings) -> Result<Geometry, Fault> {
     let header = Header::read(bytes)?;
     let data = &bytes[header.length..];
     match header.encoding {
-        Encoding::Ascii => body::read(&header, AsciiRows::new(data, header.lines)),
-        Encoding::LittleEndian => body::read(&header, BinaryRows::<false>::new(data)),
-        Encoding::BigEndian => body::read(&header, BinaryRows::<true>::new(data)),
+        Encoding::Ascii => body::read(&header, AsciiRows::new(data, header.lines), siblings),
+        Encoding::LittleEndian => body::read(&header, BinaryRows::<false>::new(data), siblings),
+        Encoding::BigEndian => body::read(&header, BinaryRows::<true>::new(data), siblings),
     }
 }

@@ -1,8 +1,7 @@
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 use super::ply_bytes;
-use crate::formats::mutation::damage;
-use crate::formats::{MeshFormat, parse_mesh};
+use crate::formats::{MeshFile, MeshFormat, Texture, TextureImage, parse_mesh};
 use crate::mesh::TriangleMesh;
 
 fn mesh(bytes: &[u8]) -> TriangleMesh {
@@ -189,8 +188,49 @@ fn what_is_written_is_read_back() {
 }
 
 #[test]
-fn damage_panics_nowhere() {
-    for bytes in [ascii(), little(), big()] {
-        damage(&bytes, 20_000, |bytes| drop(parse_mesh(bytes, MeshFormat::Ply)));
-    }
+fn colours_and_coordinates_of_vertices_are_read() {
+    let text = "ply\nformat ascii 1.0\ncomment TextureFile lost.png\nelement vertex 3\nproperty float x\n\
+                property float y\nproperty float z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\n\
+                property float s\nproperty float t\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n\
+                0 0 0 1 2 3 0 1\n1 0 0 4 5 6 .5 .25\n0 1 0 7 8 9 1 0\n3 2 1 0\n";
+    let file = MeshFile::parse(text.as_bytes(), MeshFormat::Ply).unwrap();
+    assert_eq!(file.colours.unwrap(), [[1, 2, 3, 255], [4, 5, 6, 255], [7, 8, 9, 255]]);
+    let texture = file.texture.unwrap();
+    assert_eq!(
+        (texture.corners.as_slice(), texture.coordinate(1)),
+        (&[2, 1, 0][..], Some(DVec2::new(0.5, 0.25)))
+    );
+    assert!(
+        file.warnings[0].contains("`comment TextureFile` names the file `lost.png`"),
+        "{:?}",
+        file.warnings
+    );
+    let floats = text.replace("uchar red", "float red").replace("uchar green", "double green");
+    let file =
+        MeshFile::parse(floats.replace("uchar blue", "float blue").as_bytes(), MeshFormat::Ply).unwrap();
+    assert_eq!(file.colours.unwrap()[0], [255; 4]);
+    let opaque = text.replace("property float s", "property uchar alpha");
+    let file = MeshFile::parse(opaque.as_bytes(), MeshFormat::Ply).unwrap();
+    assert_eq!(file.colours.unwrap()[2], [7, 8, 9, 1]);
+    assert!(file.texture.is_none());
+}
+
+#[test]
+fn coordinates_of_faces_and_their_pictures_are_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = "ply\nformat ascii 1.0\ncomment TextureFile a b.png\ncomment TextureFile lost.png\nelement vertex 4\n\
+                property float x\nproperty float y\nproperty float z\nelement face 4\n\
+                property list uchar int vertex_indices\nproperty list uchar float texcoord\nproperty int texnumber\n\
+                end_header\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n\
+                3 0 1 2 6 0 0 1 0 1 1 0\n2 0 1 4 0 0 1 1 0\n3 0 2 3 0 1\n3 0 2 3 2 .5 .5 7\n";
+    std::fs::write(folder.path().join("scan.ply"), text).unwrap();
+    std::fs::write(folder.path().join("a b.png"), "").unwrap();
+    let file = MeshFile::read(folder.path().join("scan.ply")).unwrap();
+    let texture = file.texture.unwrap();
+    let none = Texture::NONE;
+    assert_eq!(texture.corners, [0, 1, 2, none, none, none, 3, none, none]);
+    assert_eq!(texture.coordinates, [DVec2::ZERO, DVec2::X, DVec2::ONE, DVec2::splat(0.5)]);
+    assert_eq!(texture.polygon_images, [0, none, none]);
+    assert_eq!(texture.images, [TextureImage::File(folder.path().join("a b.png"))]);
+    assert_eq!(file.warnings.len(), 1);
 }

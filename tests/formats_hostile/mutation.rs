@@ -1,7 +1,7 @@
-//! Damaged files, for tests that no reader panics on any.
+//! Damaged files, the same ones on every run.
 
-/// Calls `read` with every beginning of `file` and with `rounds` damaged copies, the same ones on every run.
-pub(super) fn damage(file: &[u8], rounds: u64, mut read: impl FnMut(&[u8])) {
+/// Calls `read` with every beginning of `file` and with `rounds` damaged copies.
+pub fn damage(file: &[u8], rounds: u64, mut read: impl FnMut(&[u8])) {
     (0..file.len()).for_each(|end| read(&file[..end]));
     for round in 0..rounds {
         let mut random = Random(round.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1);

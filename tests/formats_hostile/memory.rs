@@ -1,48 +1,12 @@
 //! Memory that readers take for hostile files: a small multiple of the file's size, whatever the file claims.
 
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::cell::Cell;
-
 use onemesh::formats::{MeshFormat, parse_landmarks, parse_mesh};
 
-/// Counts the bytes that this thread holds, and the most that it held.
-struct Counting;
-
-thread_local! {
-    static HELD: Cell<isize> = const { Cell::new(0) };
-    static MOST: Cell<isize> = const { Cell::new(0) };
-}
-
-fn count(bytes: isize) {
-    let held = HELD.get() + bytes;
-    HELD.set(held);
-    MOST.set(MOST.get().max(held));
-}
-
-// SAFETY: every call is handed on to the system's allocator; counting allocates nothing.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        count(layout.size() as isize);
-        // SAFETY: as this function's own contract.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        count(-(layout.size() as isize));
-        // SAFETY: as this function's own contract.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-}
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;
+use crate::allocator::most_held;
 
 /// The most bytes held at once while `read` runs, for each byte of `file`.
 fn bytes_per_byte(file: &[u8], read: impl FnOnce(&[u8])) -> f64 {
-    let before = HELD.get();
-    MOST.set(before);
-    read(file);
-    (MOST.get() - before) as f64 / file.len() as f64
+    most_held(|| read(file)) as f64 / file.len() as f64
 }
 
 const LARGE: usize = 1 << 20;
@@ -56,7 +20,17 @@ fn check_mesh(format: MeshFormat, file: &[u8]) {
 
 #[test]
 fn obj_stays_small() {
-    for line in ["f 1 1 1 1 1 1 1 1 1 1\n", "v 0 0 0\n", "f\n", "f 1 1 1\n", "\\\n"] {
+    for line in [
+        "f 1 1 1 1 1 1 1 1 1 1\n",
+        "v 0 0 0\n",
+        "v 0 0 0 1 1 1\n",
+        "vt 0\n",
+        "f\n",
+        "f 1 1 1\n",
+        "f 1/1 1 1\n",
+        "usemtl a\nf 1 1 1\n",
+        "\\\n",
+    ] {
         check_mesh(MeshFormat::Obj, format!("v 0 0 0\n{}", line.repeat(LARGE / line.len())).as_bytes());
     }
     check_mesh(MeshFormat::Obj, format!("v 0 0 0\nf {}", "1 ".repeat(LARGE / 2)).as_bytes());
@@ -93,10 +67,31 @@ fn ply_stays_small() {
 }
 
 #[test]
+fn stl_stays_small() {
+    let facet = [&[0u8; 12][..], &[1; 38]].concat().repeat(LARGE / 50);
+    for claimed in [LARGE as u32 / 50, u32::MAX] {
+        check_mesh(MeshFormat::Stl, &[&[0; 80], &claimed.to_le_bytes()[..], &facet].concat());
+    }
+    for line in ["facet\nvertex 0 0 0\nvertex 0 0 1\nvertex 0 1 0\n", "solid\nendsolid\n", "facet\n"] {
+        check_mesh(MeshFormat::Stl, format!("solid\n{}endsolid", line.repeat(LARGE / line.len())).as_bytes());
+    }
+}
+
+#[test]
 fn gltf_stays_small() {
     let document = |rest: &str| format!(r#"{{"asset":{{"version":"2.0"}},{rest}}}"#);
     let list = |entry: &str| vec![entry; LARGE / (entry.len() + 1)].join(",");
-    for key in ["nodes", "meshes", "accessors", "bufferViews", "buffers", "scenes"] {
+    for key in [
+        "nodes",
+        "meshes",
+        "accessors",
+        "bufferViews",
+        "buffers",
+        "scenes",
+        "materials",
+        "textures",
+        "images",
+    ] {
         check_mesh(MeshFormat::Gltf, document(&format!(r#""{key}":[{}]"#, list("{}"))).as_bytes());
     }
     check_mesh(
@@ -119,15 +114,47 @@ fn gltf_stays_small() {
         "A".repeat(1_040_000)
     );
     check_mesh(MeshFormat::Gltf, document(&shared).as_bytes());
+    check_mesh(MeshFormat::Gltf, document(&pictures()).as_bytes());
+}
+
+/// A thousand pictures, each in the same bytes.
+fn pictures() -> String {
+    const COUNT: usize = 1000;
+    let entries = |entry: fn(usize) -> String| (0..COUNT).map(entry).collect::<Vec<_>>().join(",");
+    format!(
+        r#""meshes":[{{"primitives":[{}]}}],"materials":[{}],"textures":[{}],"images":[{}],
+           "accessors":[{{"componentType":5126,"count":3,"type":"VEC3","bufferView":0}},
+                        {{"componentType":5126,"count":3,"type":"VEC2","bufferView":0}}],
+           "bufferViews":[{{"buffer":0,"byteLength":780000}}],
+           "buffers":[{{"byteLength":780000,"uri":"data:;base64,{}"}}]"#,
+        entries(|i| format!(r#"{{"attributes":{{"POSITION":0,"TEXCOORD_0":1}},"material":{i}}}"#)),
+        entries(|i| format!(r#"{{"pbrMetallicRoughness":{{"baseColorTexture":{{"index":{i}}}}}}}"#)),
+        entries(|i| format!(r#"{{"source":{i}}}"#)),
+        entries(|_| r#"{"bufferView":0}"#.to_owned()),
+        "A".repeat(1_040_000)
+    )
+}
+
+#[track_caller]
+fn check_landmarks(file: &str) {
+    let ratio = bytes_per_byte(file.as_bytes(), |file| drop(parse_landmarks(file)));
+    let start: String = file.chars().take(60).collect();
+    assert!(ratio < LIMIT, "{ratio} bytes for each byte of `{start}...`");
 }
 
 #[test]
 fn landmarks_stay_small() {
-    for entry in ["null", "[1,2,3]", "{\"name\":\"a\"}", "[]"] {
+    for entry in ["null", "[1,2,3]", "{\"name\":\"a\"}", "[]", "[1,0,0]"] {
         let list = vec![entry; LARGE / (entry.len() + 1)].join(",");
-        for file in [format!("[{list}]"), format!("{{\"points\":[{list}]}}")] {
-            let ratio = bytes_per_byte(file.as_bytes(), |file| drop(parse_landmarks(file)));
-            assert!(ratio < LIMIT, "{ratio} bytes for each byte of `{entry}`");
-        }
+        check_landmarks(&format!("[{list}]"));
+        check_landmarks(&format!("{{\"points\":[{list}]}}"));
+        check_landmarks(&format!("{{\"groups\":[{{\"landmarks\":[{list}]}}]}}"));
+        check_landmarks(&format!("{{\"markups\":[{{\"controlPoints\":[{list}]}}]}}"));
+    }
+    for element in ["<point x='1' y='1' z='1'/>", "<a>", "<point ", "<!-- -->", "&amp;"] {
+        check_landmarks(&format!("<PickedPoints>{}", element.repeat(LARGE / element.len())));
+    }
+    for line in ["1\n", "123456789012\n", "# a comment\n", "\n"] {
+        check_landmarks(&line.repeat(LARGE / line.len()));
     }
 }
