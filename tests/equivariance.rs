@@ -79,7 +79,7 @@ fn a_fit_turns_with_its_scan_where_the_sphere_does() {
 fn a_fit_is_as_close_however_its_scan_is_turned() {
     let [head] = heads();
     let settings = settings().fit;
-    let triangles = &onemesh::pipeline::Sphere::of_level(3).topology.triangles;
+    let triangles = &onemesh::pipeline::Sphere::of_level(3).connectivity.topology.triangles;
     let figures = |turn: DQuat| {
         let mesh = moved(&head.mesh, |p| turn * p);
         let result = TriangleMesh::new(fit(&mesh, &settings), triangles.clone()).unwrap();

@@ -25,7 +25,7 @@ fn fitted(preset: Preset) -> SurfaceFigures {
     let scan = &heads(1)[0].mesh;
     let settings = Settings::for_fit(preset, 2562).unwrap().fit;
     let positions = fit_scan("head", scan, &settings, &()).unwrap();
-    let mesh = Sphere::of_level(4).topology.mesh(positions).unwrap();
+    let mesh = Sphere::of_level(4).connectivity.topology.mesh(positions).unwrap();
     surface_figures(scan, &mesh, true)
 }
 

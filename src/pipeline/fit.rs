@@ -104,7 +104,7 @@ impl<'a> Deformation<'a> {
         landmarks: Vec<LandmarkPull>,
     ) -> Self {
         let reparameterization = sphere.reparameterization(settings.lambda);
-        let topology = &sphere.topology;
+        let topology = &sphere.connectivity.topology;
         let scheduled = matches!(settings.density, Density::Scheduled { .. });
         Self {
             scan,
@@ -134,8 +134,11 @@ impl<'a> Deformation<'a> {
             self.update_matches(x, round);
         }
         let energy = self.add_energies(x);
-        let shape =
-            Shape { topology: &self.sphere.topology, positions: &self.positions, normals: &self.normals };
+        let shape = Shape {
+            topology: &self.sphere.connectivity.topology,
+            positions: &self.positions,
+            normals: &self.normals,
+        };
         let gradient = self.gradient.total(shape);
         self.reparameterization.pull_back(gradient, &mut self.buffer);
         self.adam.step(&mut self.u, gradient, self.settings.rate * self.settings.rate_end.powf(x));
@@ -150,7 +153,7 @@ impl<'a> Deformation<'a> {
     fn update_positions(&mut self) {
         self.positions.copy_from_slice(&self.u);
         self.reparameterization.to_positions(&mut self.positions, &mut self.buffer);
-        self.normals.update(&self.sphere.topology, &self.positions);
+        self.normals.update(&self.sphere.connectivity.topology, &self.positions);
     }
 
     /// Finds closest points in both directions anew.
@@ -169,7 +172,7 @@ impl<'a> Deformation<'a> {
 
     /// E = D_c + D_n in both directions + w_u E_a + w_k E_a + foldover + landmarks.
     fn add_energies(&mut self, x: f32) -> f64 {
-        let topology = &self.sphere.topology;
+        let topology = &self.sphere.connectivity.topology;
         let settings = self.settings;
         self.gradient.clear(topology);
         let gradient = &mut self.gradient;

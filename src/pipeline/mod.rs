@@ -1,6 +1,7 @@
 //! The paper's stages over a collection: fit, resample, register, and what we add to them. Layer 4.
 
 mod comparison;
+mod connectivity;
 mod fit;
 mod groupwise;
 mod manifest;
@@ -17,6 +18,7 @@ mod settings;
 mod sphere;
 
 pub use comparison::comparison_sheet;
+pub use connectivity::Connectivity;
 pub use fit::{SphereLandmark, fit};
 pub use manifest::{InputEntry, LandmarkEntry, Manifest, ScanEntry, TemplateEntry};
 pub use observer::{Canceled, Observer, Progress, Stage, Watch};

@@ -130,7 +130,7 @@ pub fn register(
     Ok(Registration {
         template: Template {
             sphere: sphere.rest.iter().map(|p| p.as_dvec3()).collect(),
-            triangles: sphere.topology.triangles.clone(),
+            triangles: sphere.connectivity.topology.triangles.clone(),
             landmarks: run.names.iter().cloned().zip(points).collect(),
             mean: (!mean.is_empty()).then_some(mean),
         },
@@ -249,7 +249,7 @@ impl Run<'_> {
                 let scans: Vec<&ScanSurface> = members.iter().map(|member| &member.scan).collect();
                 shared.redistribute(&scans, settings);
             }
-            let rest = RestShape::new(shared.sphere.clone(), shared.mean.clone());
+            let rest = RestShape::new(shared.sphere.connectivity.clone(), shared.mean.clone());
             let one = |(member, shape): (&Prepared, &Vec<Vec3A>)| {
                 let watch = Watch {
                     observer: self.observer,
@@ -284,7 +284,7 @@ fn moved_onto(shape: &[Vec3A], other: &[Vec3A]) -> Vec<Vec3A> {
 /// does not spoil the mean.
 fn trust(sphere: &Sphere, members: &[Prepared], shapes: &[Vec<Vec3A>]) -> Vec<f64> {
     let one = |(member, shape): (&Prepared, &Vec<Vec3A>)| {
-        let index = SurfaceIndex::new(shape, &sphere.topology.triangles);
+        let index = SurfaceIndex::new(shape, &sphere.connectivity.topology.triangles);
         let sum: f64 =
             (0..JUDGED).map(|k| f64::from(index.closest(member.scan.sample(k).point).distance_squared)).sum();
         1.0 / (sum / JUDGED as f64 + 1e-6)

@@ -9,7 +9,7 @@ use crate::spatial::SurfaceIndex;
 
 /// The landmarks of one fitted scan carried to the unit sphere `[B, 3]`: the closest point of the fit to each.
 pub fn landmarks_on_sphere(sphere: &Sphere, fitted: &[Vec3A], landmarks: &[Vec3A]) -> Vec<DVec3> {
-    let triangles = &sphere.topology.triangles;
+    let triangles = &sphere.connectivity.topology.triangles;
     let index = SurfaceIndex::new(fitted, triangles);
     let carry = |point: &Vec3A| {
         let hit = index.closest(*point);

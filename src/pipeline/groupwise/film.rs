@@ -42,15 +42,16 @@ pub fn fall(scan: &ScanSurface, p: Vec3A, inwards: Vec3A, slack: f32) -> Option<
 ///
 /// Solves L p = 0 on those vertices and their neighbours, the others held.
 pub fn flatten_films(sphere: &Sphere, mean: &mut [Vec3A], members: &[Vec<Vec3A>], ratio: f32) {
-    let own = vertex_areas(&sphere.topology, mean);
+    let own = vertex_areas(&sphere.connectivity.topology, mean);
     let mut stretched = vec![false; mean.len()];
     for member in members {
-        let areas = vertex_areas(&sphere.topology, member);
+        let areas = vertex_areas(&sphere.connectivity.topology, member);
         for ((stretched, area), own) in stretched.iter_mut().zip(areas).zip(&own) {
             *stretched |= area > ratio * own;
         }
     }
-    let around = |i: usize| sphere.topology.neighbours.row(i).iter().any(|&j| stretched[j as usize]);
+    let around =
+        |i: usize| sphere.connectivity.topology.neighbours.row(i).iter().any(|&j| stretched[j as usize]);
     let film: Vec<bool> = (0..mean.len()).map(|i| stretched[i] || around(i)).collect();
     if film.contains(&true) && film.contains(&false) {
         flatten(sphere, mean, &film);
@@ -58,7 +59,7 @@ pub fn flatten_films(sphere: &Sphere, mean: &mut [Vec3A], members: &[Vec<Vec3A>]
 }
 
 fn flatten(sphere: &Sphere, p: &mut [Vec3A], film: &[bool]) {
-    let mut matrix = SymmetricMatrix::diffusion(&sphere.topology, 1.0);
+    let mut matrix = SymmetricMatrix::diffusion(&sphere.connectivity.topology, 1.0);
     let mut drawn = p.to_vec();
     for ((diagonal, drawn), &film) in matrix.diagonal.iter_mut().zip(&mut drawn).zip(film) {
         // The diffusion's own weight is one.
@@ -66,7 +67,11 @@ fn flatten(sphere: &Sphere, p: &mut [Vec3A], film: &[bool]) {
         *diagonal += weight - 1.0;
         *drawn *= weight as f32;
     }
-    let Ok(system) = SparseCholesky::new(&sphere.topology, &matrix, sphere.dissection()) else { return };
+    let Ok(system) =
+        SparseCholesky::new(&sphere.connectivity.topology, &matrix, sphere.connectivity.dissection())
+    else {
+        return;
+    };
     system.solve(&mut drawn, &mut SolveBuffer::default());
     for ((p, drawn), _) in p.iter_mut().zip(drawn).zip(film).filter(|(_, film)| **film) {
         *p = drawn;
@@ -124,7 +129,7 @@ mod tests {
         let cap: Vec<usize> = (0..mean.len()).filter(|&i| sphere.rest[i].z > 0.9).collect();
         assert!(cap.len() > 10);
         for &i in &cap {
-            let ring = sphere.topology.neighbours.row(i);
+            let ring = sphere.connectivity.topology.neighbours.row(i);
             let average = ring.iter().map(|&j| mean[j as usize]).sum::<Vec3A>() / ring.len() as f32;
             assert!(mean[i].distance(average) < 1e-3, "{} {average}", mean[i]);
         }

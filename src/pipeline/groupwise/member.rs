@@ -104,7 +104,7 @@ struct Phase {
 
 impl<'a> Registration<'a> {
     fn new(rest: &'a RestShape, member: Member<'a>, settings: &'a GroupwiseSettings) -> Self {
-        let topology = &rest.sphere.topology;
+        let topology = &rest.connectivity.topology;
         Self {
             rest,
             scan: member.scan,
@@ -142,16 +142,16 @@ impl<'a> Registration<'a> {
             least_cosine: if settled { -1.0 } else { settings.least_cosine },
             fall_beyond: if settled { settings.fall_beyond } else { 0.0 },
         };
-        self.smoother = Some(self.rest.sphere.diffusion(geometric(settings.smoothing, x)));
+        self.smoother = Some(self.rest.connectivity.diffusion(geometric(settings.smoothing, x)));
         if phase > 0 {
-            self.index = SurfaceIndex::new(&self.p, &self.rest.sphere.topology.triangles);
+            self.index = SurfaceIndex::new(&self.p, &self.rest.connectivity.topology.triangles);
         }
     }
 
     /// One step of Gauss and Newton with a lagging matrix; returns the mean distance of the matches.
     fn step(&mut self, iteration: usize) -> f64 {
-        let sphere = &self.rest.sphere;
-        self.normals.update(&sphere.topology, &self.p);
+        let connectivity = &self.rest.connectivity;
+        self.normals.update(&connectivity.topology, &self.p);
         self.index.refit(&self.p);
         let vertices = self.match_vertices();
         let samples = self.match_samples(&vertices);
@@ -186,7 +186,7 @@ impl<'a> Registration<'a> {
         let mut weights: Vec<f32> =
             vertices.iter().map(|hit| INERTIA as f32 + f32::from(u8::from(hit.is_some()))).collect();
         for SampleHit { hit, weight, .. } in samples.iter().flatten() {
-            let corners = self.rest.sphere.topology.triangles[hit.triangle as usize];
+            let corners = self.rest.connectivity.topology.triangles[hit.triangle as usize];
             for (&i, w) in corners.iter().zip(hit.weights) {
                 weights[i as usize] += weight * w;
             }
@@ -222,7 +222,7 @@ impl<'a> Registration<'a> {
             return vec![None; matches.len()];
         }
         let mut normals = self.normals.vertices.clone();
-        self.rest.sphere.diffusion(FALL_SMOOTHING).solve(&mut normals, &mut self.buffer);
+        self.rest.connectivity.diffusion(FALL_SMOOTHING).solve(&mut normals, &mut self.buffer);
         let (scan, p) = (self.scan, &self.p);
         let one = |i: usize| {
             let falls = far(&matches[i]).then(|| fall(scan, p[i], -normals[i].normalize_or_zero(), beyond));
@@ -235,7 +235,7 @@ impl<'a> Registration<'a> {
         let (scan, index, settings) = (self.scan, &self.index, self.settings);
         let off: Vec<f32> =
             vertices.iter().map(|hit| hit.map_or(f32::MAX, |hit| hit.distance_squared)).collect();
-        let triangles = &self.rest.sphere.topology.triangles;
+        let triangles = &self.rest.connectivity.topology.triangles;
         let free = |sample: &SurfaceSample, hit: &Hit| {
             let difference = sample.point - hit.point;
             let distance = difference.length();
@@ -300,7 +300,7 @@ impl<'a> Registration<'a> {
             sum += f64::from(distance);
             let plane = self.settings.plane * (1.0 - (distance / FAR).min(1.0));
             let pull = along(difference, sample.normal, plane) * *weight;
-            let corners = self.rest.sphere.topology.triangles[hit.triangle as usize];
+            let corners = self.rest.connectivity.topology.triangles[hit.triangle as usize];
             for (&i, w) in corners.iter().zip(hit.weights) {
                 force[i as usize] += pull * w;
             }
@@ -310,7 +310,7 @@ impl<'a> Registration<'a> {
 
     fn add_landmark_forces(&self, force: &mut [Vec3A]) {
         for landmark in self.landmarks {
-            let corners = self.rest.sphere.topology.triangles[landmark.triangle as usize];
+            let corners = self.rest.connectivity.topology.triangles[landmark.triangle as usize];
             let now = interpolate(&self.p, corners, landmark.weights);
             let pull = (landmark.target - now) * (self.phase.landmark_weight as f32 * landmark.weight);
             for (&i, w) in corners.iter().zip(landmark.weights) {
@@ -321,18 +321,18 @@ impl<'a> Registration<'a> {
 
     /// The half Hessian of everything but the planes' freedom, which it bounds from above.
     fn factor(&self, vertices: &[Option<Hit>], samples: &[Option<SampleHit>]) -> Option<SparseCholesky> {
-        let sphere = &self.rest.sphere;
+        let connectivity = &self.rest.connectivity;
         let diagonal = vertices.iter().map(|hit| INERTIA + f64::from(u8::from(hit.is_some()))).collect();
-        let mut matrix = SymmetricMatrix { diagonal, edges: vec![0.0; sphere.topology.edges.len()] };
+        let mut matrix = SymmetricMatrix { diagonal, edges: vec![0.0; connectivity.topology.edges.len()] };
         for SampleHit { hit, weight, .. } in samples.iter().flatten() {
-            sphere.add_point(&mut matrix, hit.triangle, hit.weights, f64::from(*weight));
+            connectivity.add_point(&mut matrix, hit.triangle, hit.weights, f64::from(*weight));
         }
         for landmark in self.landmarks {
             let weight = self.phase.landmark_weight * f64::from(landmark.weight);
-            sphere.add_point(&mut matrix, landmark.triangle, landmark.weights, weight);
+            connectivity.add_point(&mut matrix, landmark.triangle, landmark.weights, weight);
         }
         self.rest.add_stiffness(self.phase.stiffness, &mut matrix);
-        SparseCholesky::new(&sphere.topology, &matrix, sphere.dissection()).ok()
+        SparseCholesky::new(&connectivity.topology, &matrix, connectivity.dissection()).ok()
     }
 }
 

@@ -27,9 +27,9 @@ pub fn redistribute(
     settings: &GroupwiseSettings,
 ) -> Vec<Hit> {
     let need = need(sphere, members, settings);
-    let topology = &sphere.topology;
+    let topology = &sphere.connectivity.topology;
     let index = SurfaceIndex::new(&sphere.rest, &topology.triangles);
-    let solver = sphere.diffusion(FLOW_LAMBDA);
+    let solver = sphere.connectivity.diffusion(FLOW_LAMBDA);
     let mut buffer = SolveBuffer::default();
     let mut x = sphere.rest.clone();
     for _ in 0..STEPS {
@@ -80,9 +80,9 @@ fn flow(topology: &Topology, x: &[Vec3A], psi: &[f32]) -> Vec<Vec3A> {
 
 /// n_i per vertex `[N]`, on the old sphere, smoothed: what the scans' samples ask for where they lie nearest.
 fn need(sphere: &Sphere, members: &[(&ScanSurface, &[Vec3A])], settings: &GroupwiseSettings) -> Vec<f32> {
-    let smoother = sphere.diffusion(settings.need_smoothing);
+    let smoother = sphere.connectivity.diffusion(settings.need_smoothing);
     let own = |&(scan, shape): &(&ScanSurface, &[Vec3A])| {
-        let index = SurfaceIndex::new(shape, &sphere.topology.triangles);
+        let index = SurfaceIndex::new(shape, &sphere.connectivity.topology.triangles);
         let mut own = vec![0f32; shape.len()];
         for k in 0..settings.samples {
             let sample = scan.sample(k);
@@ -93,7 +93,7 @@ fn need(sphere: &Sphere, members: &[(&ScanSurface, &[Vec3A])], settings: &Groupw
                 continue;
             };
             let asked = sample.curvature.clamp(1.0, 60.0).powf(settings.curvature_power);
-            let corners = sphere.topology.triangles[hit.triangle as usize];
+            let corners = sphere.connectivity.topology.triangles[hit.triangle as usize];
             for (&i, w) in corners.iter().zip(hit.weights) {
                 own[i as usize] += w * asked;
             }
@@ -138,9 +138,10 @@ mod tests {
         let moved: Vec<Vec3A> = hits.iter().map(|h| h.point).collect();
         let inside = |p: &[Vec3A]| p.iter().filter(|p| p.z > 0.9).count();
         assert!(inside(&moved) > 2 * inside(&sphere.rest), "{} {}", inside(&moved), inside(&sphere.rest));
-        let normals = Normals::new(&sphere.topology, &moved);
-        let folded = (0..sphere.topology.triangles.len())
-            .filter(|&t| normals.triangle(t).dot(moved[sphere.topology.triangles[t][0] as usize]) <= 0.0);
+        let normals = Normals::new(&sphere.connectivity.topology, &moved);
+        let folded = (0..sphere.connectivity.topology.triangles.len()).filter(|&t| {
+            normals.triangle(t).dot(moved[sphere.connectivity.topology.triangles[t][0] as usize]) <= 0.0
+        });
         assert_eq!(folded.count(), 0);
     }
 }

@@ -5,15 +5,15 @@ use rayon::prelude::*;
 
 use crate::mesh::{Normals, Topology};
 use crate::numeric::{SolveBuffer, SparseCholesky, SymmetricMatrix};
-use crate::pipeline::Sphere;
+use crate::pipeline::Connectivity;
 
 /// The shape that members are deformed from, and the elastic energy of doing so.
 ///
 /// E_J(p) = sum over edges (i, j) of w_ij |(p_i - p_j) - J_ij (m_i - m_j)|^2 with rest positions m, cotangent weights w
 /// and J_ij the mean of frozen deformation gradients at both ends.
 pub struct RestShape {
-    /// The sphere whose triangles it has.
-    pub sphere: Arc<Sphere>,
+    /// Its triangles.
+    pub connectivity: Arc<Connectivity>,
     /// Rest positions m `[N, 3]` in unit space.
     pub positions: Vec<Vec3A>,
     /// w per edge `[E]`, kept positive and bounded.
@@ -31,9 +31,9 @@ fn frame(topology: &Topology, positions: &[Vec3A], triangle: usize) -> Mat3A {
 }
 
 impl RestShape {
-    /// Prepares positions `[N, 3]` on a sphere's triangles.
-    pub fn new(sphere: Arc<Sphere>, positions: Vec<Vec3A>) -> Self {
-        let topology = &sphere.topology;
+    /// Prepares positions `[N, 3]` on a template\'s triangles.
+    pub fn new(connectivity: Arc<Connectivity>, positions: Vec<Vec3A>) -> Self {
+        let topology = &connectivity.topology;
         let inverse = |t: usize| {
             let frame = frame(topology, &positions, t);
             if frame.determinant().abs() > 1e-24 { frame.inverse() } else { Mat3A::ZERO }
@@ -41,12 +41,12 @@ impl RestShape {
         let inverse_frames = (0..topology.triangles.len()).map(inverse).collect();
         let areas = Normals::new(topology, &positions).area_vectors.iter().map(|e| e.length()).collect();
         let weights = cotangent_weights(topology, &positions);
-        Self { sphere, positions, weights, areas, inverse_frames }
+        Self { connectivity, positions, weights, areas, inverse_frames }
     }
 
     /// Deformation gradients per vertex `[N]` of positions p, diffused over the surface by `smoother`.
     pub fn gradients(&self, p: &[Vec3A], smoother: &SparseCholesky, buffer: &mut SolveBuffer) -> Vec<Mat3A> {
-        let topology = &self.sphere.topology;
+        let topology = &self.connectivity.topology;
         let of_triangles: Vec<Mat3A> = (0..topology.triangles.len())
             .into_par_iter()
             .with_min_len(1024)
@@ -72,7 +72,7 @@ impl RestShape {
 
     /// Adds -mu/2 dE_J/dp `[N, 3]` at positions p with frozen gradients `[N]`.
     pub fn add_force(&self, p: &[Vec3A], gradients: &[Mat3A], mu: f32, force: &mut [Vec3A]) {
-        for (&[a, b], &weight) in self.sphere.topology.edges.iter().zip(&self.weights) {
+        for (&[a, b], &weight) in self.connectivity.topology.edges.iter().zip(&self.weights) {
             let (a, b) = (a as usize, b as usize);
             let rest = self.positions[a] - self.positions[b];
             let wanted = 0.5 * (gradients[a] * rest + gradients[b] * rest);
@@ -84,7 +84,8 @@ impl RestShape {
 
     /// Adds mu times the energy's half Hessian, a Laplacian, to a matrix.
     pub fn add_stiffness(&self, mu: f64, matrix: &mut SymmetricMatrix) {
-        for (k, (&[a, b], &weight)) in self.sphere.topology.edges.iter().zip(&self.weights).enumerate() {
+        for (k, (&[a, b], &weight)) in self.connectivity.topology.edges.iter().zip(&self.weights).enumerate()
+        {
             let weight = mu * f64::from(weight);
             matrix.diagonal[a as usize] += weight;
             matrix.diagonal[b as usize] += weight;
@@ -121,17 +122,18 @@ fn cotangent_weights(topology: &Topology, positions: &[Vec3A]) -> Vec<f32> {
 mod tests {
     use super::*;
     use crate::numeric::finite_difference::directional_error;
+    use crate::pipeline::Sphere;
     use glam::Vec3;
 
     fn smoother(sphere: &Sphere) -> SparseCholesky {
-        let matrix = SymmetricMatrix::diffusion(&sphere.topology, 5.0);
-        SparseCholesky::new(&sphere.topology, &matrix, sphere.dissection()).unwrap()
+        let matrix = SymmetricMatrix::diffusion(&sphere.connectivity.topology, 5.0);
+        SparseCholesky::new(&sphere.connectivity.topology, &matrix, sphere.connectivity.dissection()).unwrap()
     }
 
     #[test]
     fn any_affine_deformation_is_free_of_force() {
         let sphere = Sphere::of_level(4);
-        let rest = RestShape::new(sphere.clone(), sphere.rest.clone());
+        let rest = RestShape::new(sphere.connectivity.clone(), sphere.rest.clone());
         let affine = Mat3A::from_axis_angle(Vec3::Y, 0.8) * Mat3A::from_diagonal(Vec3::new(2.0, 0.7, 1.1));
         let p: Vec<Vec3A> = sphere.rest.iter().map(|m| affine * *m + Vec3A::X).collect();
         let gradients = rest.gradients(&p, &smoother(&sphere), &mut SolveBuffer::default());
@@ -146,14 +148,14 @@ mod tests {
     #[test]
     fn force_is_the_gradient_of_the_energy() {
         let sphere = Sphere::of_level(2);
-        let rest = RestShape::new(sphere.clone(), sphere.rest.clone());
+        let rest = RestShape::new(sphere.connectivity.clone(), sphere.rest.clone());
         let p: Vec<Vec3A> = sphere.rest.iter().map(|m| *m * (1.0 + 0.2 * (5.0 * m.x).sin())).collect();
         let gradients = rest.gradients(&p, &smoother(&sphere), &mut SolveBuffer::default());
         let mut force = vec![Vec3A::ZERO; p.len()];
         rest.add_force(&p, &gradients, 1.0, &mut force);
         let half_gradient: Vec<Vec3A> = force.iter().map(|f| -*f).collect();
         let error = directional_error(&p, &half_gradient, 1e-2, 5, |p| {
-            let edges = rest.sphere.topology.edges.iter().zip(&rest.weights);
+            let edges = rest.connectivity.topology.edges.iter().zip(&rest.weights);
             let energy = |(&[a, b], &w): (&[u32; 2], &f32)| {
                 let (a, b) = (a as usize, b as usize);
                 let m = rest.positions[a] - rest.positions[b];

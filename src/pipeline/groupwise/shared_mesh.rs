@@ -45,14 +45,16 @@ impl SharedMesh {
 
 /// Values on the sphere `[N, 3]` at the points that its vertices moved to.
 fn carried(sphere: &Sphere, values: &[Vec3A], moved: &[Hit]) -> Vec<Vec3A> {
-    let at = |hit: &Hit| interpolate(values, sphere.topology.triangles[hit.triangle as usize], hit.weights);
+    let at = |hit: &Hit| {
+        interpolate(values, sphere.connectivity.topology.triangles[hit.triangle as usize], hit.weights)
+    };
     moved.iter().map(at).collect()
 }
 
 /// The same points of the sphere on its moved triangles.
 fn relocated(sphere: &Sphere, points: &[SurfacePoint], moved: &[Hit]) -> Vec<SurfacePoint> {
     let vertices: Vec<Vec3A> = moved.iter().map(|hit| hit.point).collect();
-    let index = SurfaceIndex::new(&vertices, &sphere.topology.triangles);
+    let index = SurfaceIndex::new(&vertices, &sphere.connectivity.topology.triangles);
     let relocate = |position: DVec3| {
         let hit = index.closest(position.as_vec3a());
         SurfacePoint { triangle: TriangleId(hit.triangle), weights: hit.weights.map(f64::from) }

@@ -1,0 +1,74 @@
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock};
+
+use glam::Vec3A;
+
+use crate::mesh::Topology;
+use crate::numeric::{Dissection, SparseCholesky, SymmetricMatrix};
+
+/// The triangles of a template with what is made for them once and kept: topology, elimination order, factors.
+pub struct Connectivity {
+    /// Triangles, edges and rings.
+    pub topology: Topology,
+    /// The shape `[N, 3]` that the elimination order is cut by.
+    rest: Vec<Vec3A>,
+    dissection: OnceLock<Dissection>,
+    /// The edges of each triangle: from its first, second, third corner to the next.
+    triangle_edges: Vec<[u32; 3]>,
+    diffusions: Mutex<HashMap<u64, Arc<SparseCholesky>>>,
+}
+
+/// A poisoned cache is still a cache: entries are only ever inserted whole.
+pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
+}
+
+impl Connectivity {
+    /// Triangles `[F, 3]` on positions `[N, 3]` that show which vertices are near each other.
+    pub fn new(rest: &[Vec3A], triangles: &[[u32; 3]]) -> Self {
+        let topology = Topology::new(rest.len(), triangles);
+        Self {
+            triangle_edges: triangle_edges(&topology),
+            topology,
+            rest: rest.to_vec(),
+            dissection: OnceLock::new(),
+            diffusions: Mutex::default(),
+        }
+    }
+
+    /// The elimination order of the vertices.
+    pub fn dissection(&self) -> &Dissection {
+        self.dissection.get_or_init(|| Dissection::new(&self.topology, &self.rest))
+    }
+
+    /// The solver of (I + lambda L) x = b, factored at its first use.
+    pub fn diffusion(&self, lambda: f64) -> Arc<SparseCholesky> {
+        lock(&self.diffusions)
+            .entry(lambda.to_bits())
+            .or_insert_with(|| {
+                let matrix = SymmetricMatrix::diffusion(&self.topology, lambda.max(0.0));
+                let made = SparseCholesky::new(&self.topology, &matrix, self.dissection());
+                Arc::new(made.expect("I + lambda L is positive definite for lambda >= 0"))
+            })
+            .clone()
+    }
+
+    /// Adds `weight` b b^T to a matrix, for a point b of barycentric weights on a triangle.
+    pub fn add_point(&self, matrix: &mut SymmetricMatrix, triangle: u32, weights: [f32; 3], weight: f64) {
+        let corners = self.topology.triangles[triangle as usize];
+        let edges = self.triangle_edges[triangle as usize];
+        for k in 0..3 {
+            let (own, next) = (f64::from(weights[k]), f64::from(weights[(k + 1) % 3]));
+            matrix.diagonal[corners[k] as usize] += weight * own * own;
+            matrix.edges[edges[k] as usize] += weight * own * next;
+        }
+    }
+}
+
+fn triangle_edges(topology: &Topology) -> Vec<[u32; 3]> {
+    let edge = |a: u32, b: u32| {
+        let at = topology.edges.binary_search(&[a.min(b), a.max(b)]);
+        at.expect("every side of a triangle is an edge") as u32
+    };
+    topology.triangles.iter().map(|&[a, b, c]| [edge(a, b), edge(b, c), edge(c, a)]).collect()
+}
