@@ -4,8 +4,11 @@ use std::time::Instant;
 use anyhow::Context;
 use onemesh::formats::{Collection, InputFile, Scan};
 use onemesh::pipeline::{Package, Registration, Report, Settings, Subject, register, spare_inputs};
+use onemesh::preflight::Inspection;
 use rayon::prelude::*;
 
+use super::audit::audit_subjects;
+use super::findings::warn;
 use super::parameters::Parameters;
 use super::progress::ProgressBars;
 
@@ -51,6 +54,7 @@ pub fn register_collection(collection: &Path, output: &Path, settings: &Settings
     let reading = start.elapsed().as_secs_f64();
     spinner.finish_and_clear();
     spare_inputs(output, &subjects, &inputs)?;
+    look_first(&subjects);
     let registration =
         register(&subjects, settings, &bars).with_context(|| collection.display().to_string())?;
     let spinner = bars.spinner("writing");
@@ -61,6 +65,16 @@ pub fn register_collection(collection: &Path, output: &Path, settings: &Settings
     let report = package.write(output)?;
     spinner.finish_and_clear();
     Ok(Outcome { subjects, registration, report })
+}
+
+/// Warns of what may spoil the results.
+fn look_first(subjects: &[Subject]) {
+    let inspections: Vec<Inspection> = subjects.par_iter().map(|s| Inspection::new(&s.mesh, None)).collect();
+    for ((subject, inspection), scan) in subjects.iter().zip(inspections).zip(audit_subjects(subjects).scans)
+    {
+        warn(&subject.name, &inspection.findings);
+        warn(&subject.name, &scan.findings);
+    }
 }
 
 /// The scans of a collection and the files they were read from.

@@ -10,7 +10,7 @@ use std::path::PathBuf;
 use anyhow::Context;
 use onemesh::demo::{SculptedHead, Sculptor, Settings};
 use onemesh::formats::read_mesh;
-use onemesh::mesh::TriangleMesh;
+use onemesh::mesh::{LandmarkSet, TriangleMesh};
 
 use clock::Clock;
 
@@ -60,9 +60,10 @@ impl Bench {
             }
         }
         let finest = if self.quick { 10242 } else { 40962 };
-        for (name, scan) in scans_of(&scans, sculpted)? {
+        for Bed { name, scan, landmarks } in beds(&scans, sculpted)? {
             if self.does(Part::Kernels) {
                 kernels::nearest_points(&clock, &name, &scan);
+                kernels::inspection(&clock, &name, &scan, landmarks.as_ref());
             }
             if self.does(Part::Fits) {
                 stages::fits(&clock, &name, &scan, finest)?;
@@ -74,6 +75,7 @@ impl Bench {
         if self.does(Part::Kernels) {
             kernels::solves(&clock, finest);
             kernels::iteration(&clock);
+            kernels::self_intersection(&clock);
         }
         Ok(())
     }
@@ -87,15 +89,24 @@ fn is_collection(path: &std::path::Path) -> bool {
     path.is_dir() || path.extension().is_some_and(|extension| extension == "json")
 }
 
-fn scans_of(paths: &[PathBuf], sculpted: bool) -> anyhow::Result<Vec<(String, TriangleMesh)>> {
+/// A scan to time work on.
+struct Bed {
+    name: String,
+    scan: TriangleMesh,
+    landmarks: Option<LandmarkSet>,
+}
+
+fn beds(paths: &[PathBuf], sculpted: bool) -> anyhow::Result<Vec<Bed>> {
     if sculpted {
-        let head = sculpt(1, TRIANGLES).remove(0);
-        return Ok(vec![(format!("sculpted, {} triangles", head.mesh.triangles().len()), head.mesh)]);
+        let SculptedHead { mesh: scan, landmarks, .. } = sculpt(1, TRIANGLES).remove(0);
+        let name = format!("sculpted, {} triangles", scan.triangles().len());
+        return Ok(vec![Bed { name, scan, landmarks: Some(landmarks) }]);
     }
     let read = |path: &PathBuf| {
-        let mesh = read_mesh(path).with_context(|| "a scan to fit")?;
-        let name = path.file_stem().unwrap_or_default().to_string_lossy();
-        Ok((format!("{name}, {} triangles", mesh.triangles().len()), mesh))
+        let scan = read_mesh(path).with_context(|| "a scan to fit")?;
+        let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+        let name = format!("{stem}, {} triangles", scan.triangles().len());
+        Ok(Bed { name, scan, landmarks: None })
     };
     paths.iter().map(read).collect()
 }
