@@ -14,7 +14,7 @@ use onemesh::preflight::{AuditCase, Code, LandmarkAudit, audit};
 /// Millimetres to a unit of the scans.
 const MILLIMETRES: f64 = 10.0;
 /// Faults of each kind planted in each scan.
-const PLANTED: usize = 40;
+const PLANTED: usize = 20;
 
 struct Heads {
     names: Vec<String>,
@@ -179,11 +179,9 @@ fn planted_faults_are_found() {
     );
     assert!(alarms.is_empty(), "{alarms:?}");
     assert!(overall.rate() > 0.95, "{}", overall.rate());
-    assert!(overall.false_scans * 50 < 12 * overall.planted);
-    assert!(
-        overall.false_landmarks * 50 < overall.planted,
-        "less than 2 % of audits name an untouched landmark"
-    );
+    let (audits, scans) = (overall.planted, heads.names.len());
+    assert!(overall.false_scans * 100 < audits * (scans - 1), "1 % of the scans that were not touched");
+    assert!(overall.false_landmarks * 1000 < audits * scans * 68, "1 in 1000 of the landmarks that were not");
 }
 
 fn codes(audit: &LandmarkAudit, scan: &str) -> Vec<Code> {
@@ -196,12 +194,14 @@ fn sets_that_are_wrong_as_a_whole_are_found() {
     let Some(heads) = Heads::read() else { return };
     let scheme = Scheme::named("multipie68").unwrap();
     let mut random = Random::new(23);
+    let (mut audits, mut others) = (0, 0);
     for at in 0..heads.names.len() {
         let (name, own) = (&heads.names[at], &heads.landmarks[at]);
-        let expect = |what: &str, set: &LandmarkSet, surface: bool, wanted: &[Code]| {
+        let mut expect = |what: &str, set: &LandmarkSet, surface: bool, wanted: &[Code]| {
             let audit = heads.audited(at, set, surface);
             assert_eq!(codes(&audit, name), wanted, "{what}, {name}");
-            assert_eq!(named(&audit).len(), usize::from(!wanted.is_empty()), "others than {name}");
+            audits += 1;
+            others += named(&audit).keys().filter(|other| *other != name).count();
         };
         expect("nothing", own, true, &[]);
         let mut swapped = own.clone();
@@ -219,4 +219,6 @@ fn sets_that_are_wrong_as_a_whole_are_found() {
         (0..68).for_each(|i| shuffled.points.swap(i, random.below(68)));
         expect("shuffled", &shuffled, false, &[Code::LandmarksDisordered]);
     }
+    println!("{others} scans named falsely in {audits} audits");
+    assert!(others * 100 < audits * (heads.names.len() - 1), "1 % of the scans that were not touched");
 }

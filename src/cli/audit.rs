@@ -32,10 +32,12 @@ impl Audit {
 
 /// The audit of scans that have been read.
 pub fn audit_subjects(subjects: &[Subject]) -> LandmarkAudit {
-    let case = |subject: &'_ Subject| -> AuditCase<'_> {
-        AuditCase { name: &subject.name, landmarks: &subject.landmarks, mesh: Some(&subject.mesh) }
-    };
-    audit(&subjects.iter().map(case).collect::<Vec<_>>())
+    let cases = subjects.iter().map(|Subject { name, mesh, landmarks }| AuditCase {
+        name,
+        landmarks,
+        mesh: Some(mesh),
+    });
+    audit(&cases.collect::<Vec<_>>())
 }
 
 fn print(collection: &Path, audit: &LandmarkAudit) {

@@ -130,8 +130,12 @@ pub fn audit(cases: &[AuditCase]) -> LandmarkAudit {
     LandmarkAudit { spread: spread(&names, &aligned, &shape), scans }
 }
 
-/// A face without the landmarks that count nothing.
+/// A face without the landmarks that count nothing; one that is mirrored was mirrored back, and teaches as any other.
 fn trusted(face: Points, names: &[String], scan: &ScanAudit) -> Points {
+    let sides = [Code::LandmarksMirrored, Code::LeftRightSwapped];
+    if matches!(&scan.findings[..], [finding] if sides.contains(&finding.code)) {
+        return face;
+    }
     let counts = |name: &String| scan.weights.get(name).is_some_and(|&weight| weight > 0.0);
     face.into_iter().zip(names).map(|(point, name)| point.filter(|_| counts(name))).collect()
 }

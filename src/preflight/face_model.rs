@@ -45,34 +45,55 @@ impl FaceModel {
     /// Learns from faces that are aligned to `shape`.
     pub fn new(faces: &[&Points], shape: &[DVec3]) -> Self {
         let mean = middle(faces.iter().copied(), shape);
-        let seen = seen(faces, &mean);
         let smooth = smooth(&mean);
+        let mut model = Self { looseness: vec![1.0; mean.len()], covariance: smooth.clone(), mean };
+        let filled: Vec<Vec<DVec3>> = faces.iter().map(|face| model.filled(face)).collect();
+        let seen = seen(&filled, &model.mean);
         let scale = (seen.trace() / smooth.trace()).max(LEAST_VARIANCE);
-        let hand = DMatrix::from_diagonal_element(mean.len(), mean.len(), HAND * HAND);
-        let covariance = SEEN * seen + (1.0 - SEEN) * scale * smooth + hand;
-        let mut model = Self { looseness: vec![1.0; mean.len()], covariance, mean };
-        model.looseness = model.looseness_on(faces);
+        let hand = DMatrix::from_diagonal_element(shape.len(), shape.len(), HAND * HAND);
+        model.covariance = SEEN * seen + (1.0 - SEEN) * scale * smooth + hand;
+        model.looseness = model.looseness_on(&filled);
         model
+    }
+
+    /// The mean face, to be changed to another.
+    fn expectation_of_mean(&self) -> Option<Expectation> {
+        self.expectation(&self.mean.iter().copied().map(Some).collect())
+    }
+
+    /// A face whose missing landmarks are where the others put them: were they on the mean face, it would seem that they
+    /// do not move with the others.
+    fn filled(&self, face: &Points) -> Vec<DVec3> {
+        let mut filled: Vec<DVec3> =
+            face.iter().zip(&self.mean).map(|(p, mean)| p.unwrap_or(*mean)).collect();
+        let missing = || (0..face.len()).filter(|&at| face[at].is_none());
+        if missing().next().is_none() {
+            return filled;
+        }
+        if let Some(mut expectation) = self.expectation_of_mean() {
+            expectation.move_to(&filled);
+            missing().for_each(|at| expectation.ignore(at));
+            missing().for_each(|at| filled[at] = expectation.of(at).point);
+        }
+        filled
     }
 
     /// How strange each landmark looks on a quarter of the faces at least, in units of what is usual on each face.
     ///
     /// A tip of a nose departs from what its neighbours say by more than they do from each other.
-    fn looseness_on(&self, faces: &[&Points]) -> Vec<f64> {
-        let complete = |face: &&Points| -> Points {
-            face.iter().zip(&self.mean).map(|(point, mean)| point.or(Some(*mean))).collect()
-        };
-        let mean: Points = self.mean.iter().copied().map(Some).collect();
-        let Some(mut expectation) = self.expectation(&mean) else {
+    fn looseness_on(&self, faces: &[Vec<DVec3>]) -> Vec<f64> {
+        let Some(mut expectation) = self.expectation_of_mean() else {
             return self.looseness.clone();
         };
         let mut relative = vec![Vec::with_capacity(faces.len()); self.mean.len()];
-        for face in faces.iter().map(complete) {
-            expectation.deviations =
-                face.iter().flatten().zip(&self.mean).map(|(point, mean)| *point - *mean).collect();
+        for face in faces {
+            expectation.move_to(face);
             let strangeness = expectation.strangeness();
             let usual = usual_strangeness(strangeness.iter().copied());
-            relative.iter_mut().zip(&strangeness).for_each(|(all, s)| all.push(s / usual));
+            relative
+                .iter_mut()
+                .zip(&strangeness)
+                .for_each(|(all, strangeness)| all.push(strangeness / usual));
         }
         relative.into_iter().map(|all| (quantile(all, 0.75) / QUARTILE).max(1.0)).collect()
     }
@@ -93,10 +114,10 @@ impl FaceModel {
 }
 
 /// The covariance seen on faces; what departs most counts less, since it may be a mistake or a caricature.
-fn seen(faces: &[&Points], mean: &[DVec3]) -> DMatrix<f64> {
+fn seen(faces: &[Vec<DVec3>], mean: &[DVec3]) -> DMatrix<f64> {
     let deviations: Vec<Vec<DVec3>> = faces
         .iter()
-        .map(|face| face.iter().zip(mean).map(|(p, m)| p.map_or(DVec3::ZERO, |p| p - *m)).collect())
+        .map(|face| face.iter().zip(mean).map(|(point, mean)| *point - *mean).collect())
         .collect();
     let typical: Vec<f64> =
         (0..mean.len()).map(|i| median(deviations.iter().map(|face| face[i].length()))).collect();
@@ -157,6 +178,11 @@ impl Expectation {
     /// Where a landmark is.
     pub fn point(&self, at: usize) -> DVec3 {
         self.mean[at] + self.deviations[at]
+    }
+
+    /// Puts the landmarks elsewhere.
+    fn move_to(&mut self, points: &[DVec3]) {
+        self.deviations = points.iter().zip(&self.mean).map(|(point, mean)| *point - *mean).collect();
     }
 
     /// Where a landmark should be, from the others.

@@ -3,7 +3,7 @@
 use super::face_model::{Expectation, usual_strangeness};
 
 /// A landmark this many times as strange as the median landmark of its scan is misplaced.
-const MISPLACED: f64 = 4.2;
+const MISPLACED: f64 = 4.4;
 /// From here on a landmark counts less and less.
 const DOUBTED: f64 = 3.0;
 /// A landmark closer than this to where it should be is right, in units of the face's root mean square radius: about
