@@ -203,7 +203,9 @@ fn sets_that_are_wrong_as_a_whole_are_found() {
             audits += 1;
             others += named(&audit).keys().filter(|other| *other != name).count();
         };
-        expect("nothing", own, true, &[]);
+        // The lips of 108, an extreme caricature, are up to 6 mm away from their landmarks.
+        let off: &[Code] = if name == "108" { &[Code::LandmarksOffSurface] } else { &[] };
+        expect("nothing", own, true, off);
         let mut swapped = own.clone();
         for (point, landmark) in swapped.points.iter_mut().zip(&own.names) {
             *point = own.get(&scheme.mirrored(landmark).unwrap());

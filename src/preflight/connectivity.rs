@@ -171,31 +171,36 @@ fn ends(triangles: &[[u32; 3]], side: &Side) -> [u32; 2] {
     [side.corner, next(side.corner)].map(|corner| triangles[corner as usize / 3][corner as usize % 3])
 }
 
-/// Directed edges `[E, 2]`, chained end to end as far as they go.
+/// Directed edges `[E, 2]`, chained end to end as far as they go; against their direction only where there is no other
+/// way on.
 fn chains(edges: &[[u32; 2]]) -> Vec<Vec<[u32; 2]>> {
-    let mut leaving: Vec<usize> = (0..edges.len()).collect();
-    leaving.sort_unstable_by_key(|&at| edges[at]);
+    // The edges at each vertex, those that leave it first.
+    let mut ends: Vec<(u32, bool, usize)> = Vec::with_capacity(2 * edges.len());
+    for (at, &[from, to]) in edges.iter().enumerate() {
+        ends.extend([(from, false, at), (to, true, at)]);
+    }
+    ends.sort_unstable();
     let mut used = vec![false; edges.len()];
-    let mut chains = Vec::new();
     // Where each vertex's next unused edge is looked for: a vertex of many rims must not be searched again and again.
-    let mut looked: Vec<usize> = (0..edges.len()).collect();
+    let mut looked: Vec<usize> = (0..ends.len()).collect();
+    let mut next_at = |vertex: u32, used: &[bool]| {
+        let first = ends.partition_point(|end| end.0 < vertex);
+        let slot = looked.get_mut(first)?;
+        while ends.get(*slot).is_some_and(|end| end.0 == vertex && used[end.2]) {
+            *slot += 1;
+        }
+        ends.get(*slot).filter(|end| end.0 == vertex).map(|end| end.2)
+    };
+    let mut chains = Vec::new();
     for start in 0..edges.len() {
-        let mut chain = Vec::new();
-        let mut at = Some(start).filter(|&at| !used[leaving[at]]);
-        while let Some(slot) = at {
-            used[leaving[slot]] = true;
-            chain.push(edges[leaving[slot]]);
-            let to = edges[leaving[slot]][1];
-            let first = leaving.partition_point(|&edge| edges[edge][0] < to);
-            at = (first < leaving.len()).then(|| {
-                let mut slot = looked[first].max(first);
-                while slot < leaving.len() && edges[leaving[slot]][0] == to && used[leaving[slot]] {
-                    slot += 1;
-                }
-                looked[first] = slot;
-                slot
-            });
-            at = at.filter(|&slot| slot < leaving.len() && edges[leaving[slot]][0] == to);
+        let (mut chain, mut way_on) = (Vec::new(), Some(start).filter(|&at| !used[at]));
+        let mut vertex = edges[start][0];
+        while let Some(at) = way_on {
+            used[at] = true;
+            chain.push(edges[at]);
+            let [from, to] = edges[at];
+            vertex = if from == vertex { to } else { from };
+            way_on = next_at(vertex, &used);
         }
         if !chain.is_empty() {
             chains.push(chain);
@@ -284,6 +289,20 @@ mod tests {
         let found = of(positions, triangles);
         assert_eq!(found.loops.len(), 1);
         assert!(found.largest_volume > 0.0);
+    }
+
+    #[test]
+    fn a_rim_goes_on_past_a_triangle_that_is_turned_round() {
+        let (positions, mut triangles) = sphere();
+        triangles.retain(|t| !t.contains(&40));
+        let rim = of(positions.clone(), triangles.clone()).loops[0];
+        let on_rim = |i: &u32| positions[*i as usize].distance(positions[40]) < 0.4;
+        let turned = triangles.iter().position(|t| t.iter().filter(|i| on_rim(i)).count() == 2);
+        triangles[turned.unwrap()].swap(0, 1);
+        let found = of(positions, triangles);
+        assert_eq!(found.loops.len(), 1);
+        assert_eq!(found.loops[0].vertices, rim.vertices);
+        assert!(found.opposed_edges > 0);
     }
 
     #[test]
