@@ -139,7 +139,8 @@ fn scans_and_collections_are_looked_at_first() {
     let said = inspect(&[]);
     assert!(said.contains("cm (") && said.contains("facing +Z") && !said.contains("warning"), "{said}");
     let audit = |more: &[&Path]| succeeded(&onemesh([Path::new("audit"), &scans].iter().chain(more)));
-    assert!(audit(&[]).contains("0 of 6 scans need a look"));
+    let said = audit(&[]);
+    assert!(said.contains("0 of 6 scans need a look"), "{said}");
 
     let mut set = read_landmarks(&landmarks).unwrap();
     set.points.swap(8, 27);

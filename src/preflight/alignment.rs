@@ -11,8 +11,8 @@ const ROUNDS: usize = 8;
 const SETTLING: usize = 4;
 /// How many scans stand for all where each is held against each.
 const CANDIDATES: usize = 16;
-/// A face and its mirror image differ so clearly that the right one fits at least this many times better.
-const CLEARLY: f64 = 2.0;
+/// The mirror image is taken for the face if it fits at least this many times better: where a face is nearly flat, both fit.
+const CLEARLY: f64 = 1.3;
 
 /// Multiplied with a point gives its mirror image.
 pub(super) const MIRROR: DVec3 = DVec3::new(-1.0, 1.0, 1.0);

@@ -19,7 +19,7 @@ const MOST_LANDMARKS: usize = 400;
 /// Fewer landmarks on a scan are no face.
 pub(super) const LEAST_LANDMARKS: usize = 6;
 /// Fewer scans tell too little of how faces vary; sculpted heads help where the scheme is known.
-const LEAST_SCANS: usize = 5;
+const LEAST_SCANS: usize = 8;
 /// Parts of a collection, each of which is judged by the others.
 const PARTS: usize = 16;
 /// Landmarks whose median distance from the shared shape is more of a face's root mean square radius are no face.
@@ -32,7 +32,7 @@ const FAR_OFF: f64 = 6.0;
 /// However far they lie off.
 const MOST_OFF: f64 = 0.15;
 /// A scan of which this share of landmarks lies off the surface has landmarks from elsewhere.
-const ELSEWHERE: f64 = 0.4;
+const ELSEWHERE: f64 = 0.3;
 
 /// One scan's landmarks to be audited.
 #[derive(Debug, Clone, Copy)]
@@ -71,7 +71,7 @@ pub struct ScanAudit {
 /// Finds landmarks that are misplaced, exchanged, mirrored or those of another scan.
 ///
 /// Every landmark is held against where it should be from the scan's other landmarks, as the other scans teach: a scan
-/// is never judged by itself. Fewer than five scans are judged by sculpted heads if they state a scheme that the program
+/// is never judged by itself. Fewer than eight scans are judged by sculpted heads if they state a scheme that the program
 /// knows, and not at all otherwise. With a mesh, landmarks are also held against the surface. Landmarks that less than
 /// half of the scans have are passed over, and all beyond the first 400.
 pub fn audit(cases: &[AuditCase]) -> LandmarkAudit {
