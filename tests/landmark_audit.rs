@@ -1,4 +1,4 @@
-//! Faults planted in the landmarks of real heads: how many are found, and what is raised falsely.
+//! Faults planted in the landmarks of heads of a morphable model: how many are found, and what is raised falsely.
 //!
 //! `cargo test --release --test landmark_audit -- --nocapture` prints the rates by kind and size.
 
