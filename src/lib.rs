@@ -8,8 +8,8 @@
 //! |---|---|---|
 //! | L0 | mesh | triangles, normals and edge lengths with their pull-backs, landmarks, template spheres |
 //! | L1 | numeric | sparse Cholesky, rotations between point sets, the optimiser; `numeric/cholesky` alone names nalgebra_sparse |
-//! | L2 | spatial, reparam, energy, density, formats, picture, demo | nearest points; u and p; the terms that are minimised; target edge lengths; files; pictures; sculpted heads |
-//! | L3 | evaluate | figures of a result on its scan and across a collection |
+//! | L2 | spatial, reparam, energy, density, formats, picture, demo | nearest points, self-intersections; u and p; the terms that are minimised; target edge lengths; files; pictures; sculpted heads |
+//! | L3 | evaluate, preflight | figures of a result on its scan and across a collection; what is wrong with scans and landmarks |
 //! | L4 | pipeline | the stages, their parameters, what they leave behind |
 //! | L5 | cli | the commands, in the program alone, which alone names clap, anyhow and indicatif |
 //!
@@ -51,5 +51,6 @@ pub mod mesh;
 pub mod numeric;
 pub mod picture;
 pub mod pipeline;
+pub mod preflight;
 pub mod reparam;
 pub mod spatial;

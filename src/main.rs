@@ -21,6 +21,8 @@ enum Command {
     Register(cli::Register),
     Fit(cli::Fit),
     Evaluate(cli::Evaluate),
+    Inspect(cli::Inspect),
+    Audit(cli::Audit),
     Demo(cli::Demo),
     Bench(cli::Bench),
 }
@@ -31,6 +33,8 @@ fn main() -> ExitCode {
         Command::Register(command) => command.run(),
         Command::Fit(command) => command.run(),
         Command::Evaluate(command) => command.run(),
+        Command::Inspect(command) => command.run(),
+        Command::Audit(command) => command.run(),
         Command::Demo(command) => command.run(),
         Command::Bench(command) => command.run(),
     }))

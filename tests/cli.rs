@@ -127,6 +127,38 @@ fn one_scan_is_fitted_and_measured() {
 }
 
 #[test]
+fn scans_and_collections_are_looked_at_first() {
+    let folder = tempfile::tempdir().unwrap();
+    let scans = folder.path().join("scans");
+    let names = write_collection(&scans, 6);
+    let own = scans.join(&names[2]);
+    let (scan, landmarks) = (own.join("scan.ply"), own.join("landmarks.json"));
+    let inspect = [Path::new("inspect"), &scans.join(&names[2]).join("scan.ply"), Path::new("--landmarks")];
+    let inspect =
+        |more: &[&Path]| succeeded(&onemesh(inspect.iter().chain([&landmarks.as_path()]).chain(more)));
+    let said = inspect(&[]);
+    assert!(said.contains("cm (") && said.contains("facing +Z") && !said.contains("warning"), "{said}");
+    let audit = |more: &[&Path]| succeeded(&onemesh([Path::new("audit"), &scans].iter().chain(more)));
+    let said = audit(&[]);
+    assert!(said.contains("0 of 6 scans need a look"), "{said}");
+
+    let mut set = read_landmarks(&landmarks).unwrap();
+    set.points.swap(8, 27);
+    write_landmarks(&landmarks, &set).unwrap();
+    let said = inspect(&[]);
+    assert!(said.contains("[landmarks_swapped]") && said.contains("`8` and `27`"), "{said}");
+    let inspection: Value = serde_json::from_str(&inspect(&[Path::new("--json")])).unwrap();
+    assert_eq!(inspection["findings"][0]["code"], "landmarks_swapped");
+    assert_eq!(inspection["unit"]["unit"], "cm");
+    let said = audit(&[]);
+    assert!(said.contains("1 of 6 scans need a look") && said.contains(&names[2]), "{said}");
+    let audit: Value = serde_json::from_str(&audit(&[Path::new("--json")])).unwrap();
+    assert_eq!(audit["scans"][2]["findings"][0]["landmarks"], serde_json::json!(["8", "27"]));
+    assert_eq!(audit["scans"][2]["weights"]["8"], 0.0);
+    assert_eq!(read_mesh(scan).unwrap().positions().len() as u64, inspection["vertices"]);
+}
+
+#[test]
 fn a_demo_is_sculpted_registered_and_measured() {
     let folder = tempfile::tempdir().unwrap();
     let mut arguments = vec!["demo", "--count", "2", "-o", folder.path().to_str().unwrap()];

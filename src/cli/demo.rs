@@ -39,7 +39,7 @@ impl Demo {
         let collection = write_heads(&heads, &self.output)?;
         println!("{} heads are sculpted: {}", heads.len(), collection.display());
         let results = self.output.join("result");
-        let outcome = register_collection(&collection, &results, &settings)?;
+        let outcome = register_collection(&collection, &results, None, &settings)?;
         outcome.print(&results);
         let figures = correspondence(&heads, &outcome)?;
         if let Some(distances) = figures.distances {

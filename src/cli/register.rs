@@ -3,11 +3,17 @@ use std::time::Instant;
 
 use anyhow::Context;
 use onemesh::formats::{Collection, InputFile, Scan};
-use onemesh::pipeline::{Package, Registration, Report, Settings, Subject, register, spare_inputs};
+use onemesh::pipeline::{
+    Package, Registration, Report, Settings, Subject, Template, register, register_to, spare_inputs,
+};
+use onemesh::preflight::Inspection;
 use rayon::prelude::*;
 
+use super::audit::audit_subjects;
+use super::findings::warn;
 use super::parameters::Parameters;
 use super::progress::ProgressBars;
+use super::template::TemplateFiles;
 
 /// Registers a collection: the same triangles on every scan.
 #[derive(Debug, clap::Args)]
@@ -19,6 +25,8 @@ pub struct Register {
     #[arg(short, long, value_name = "FOLDER")]
     output: PathBuf,
     #[command(flatten)]
+    template: TemplateFiles,
+    #[command(flatten)]
     parameters: Parameters,
 }
 
@@ -26,7 +34,8 @@ impl Register {
     /// Does it.
     pub fn run(self) -> anyhow::Result<()> {
         let settings = self.parameters.for_registration()?;
-        let outcome = register_collection(&self.collection, &self.output, &settings)?;
+        let template = self.template.read()?;
+        let outcome = register_collection(&self.collection, &self.output, template.as_ref(), &settings)?;
         outcome.print(&self.output);
         Ok(())
     }
@@ -43,7 +52,12 @@ pub struct Outcome {
 }
 
 /// Reads a collection, registers it and writes the results to a folder.
-pub fn register_collection(collection: &Path, output: &Path, settings: &Settings) -> anyhow::Result<Outcome> {
+pub fn register_collection(
+    collection: &Path,
+    output: &Path,
+    template: Option<&Template>,
+    settings: &Settings,
+) -> anyhow::Result<Outcome> {
     let start = Instant::now();
     let bars = ProgressBars::new();
     let spinner = bars.spinner("reading");
@@ -51,8 +65,12 @@ pub fn register_collection(collection: &Path, output: &Path, settings: &Settings
     let reading = start.elapsed().as_secs_f64();
     spinner.finish_and_clear();
     spare_inputs(output, &subjects, &inputs)?;
-    let registration =
-        register(&subjects, settings, &bars).with_context(|| collection.display().to_string())?;
+    look_first(&subjects);
+    let registration = match template {
+        Some(template) => register_to(template, &subjects, settings, &bars),
+        None => register(&subjects, settings, &bars),
+    };
+    let registration = registration.with_context(|| collection.display().to_string())?;
     let spinner = bars.spinner("writing");
     let root = if collection.is_dir() { collection } else { collection.parent().unwrap_or(Path::new("")) };
     let registered = &registration;
@@ -61,6 +79,16 @@ pub fn register_collection(collection: &Path, output: &Path, settings: &Settings
     let report = package.write(output)?;
     spinner.finish_and_clear();
     Ok(Outcome { subjects, registration, report })
+}
+
+/// Warns of what may spoil the results.
+fn look_first(subjects: &[Subject]) {
+    let inspections: Vec<Inspection> = subjects.par_iter().map(|s| Inspection::new(&s.mesh, None)).collect();
+    for ((subject, inspection), scan) in subjects.iter().zip(inspections).zip(audit_subjects(subjects).scans)
+    {
+        warn(&subject.name, &inspection.findings);
+        warn(&subject.name, &scan.findings);
+    }
 }
 
 /// The scans of a collection and the files they were read from.

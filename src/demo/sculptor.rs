@@ -67,6 +67,24 @@ impl Sculptor {
         Self { settings, ..self }
     }
 
+    /// The landmarks `[68, 3]` alone of `count` upright heads, as those of [`Sculptor::collection`] in their scheme and
+    /// strengths; quick, since nothing is triangulated.
+    ///
+    /// # Panics
+    /// If there are no strengths.
+    pub fn landmarks_of_heads(seed: u64, count: usize, strengths: &[f64]) -> Vec<Vec<DVec3>> {
+        let anatomy = Anatomy::default();
+        let directions = landmarks::directions(anatomy.skull());
+        let head = |index: usize| {
+            let mut random = Random::part(seed, index as u64);
+            let identity = Identity::random(&mut random, strengths[index % strengths.len()]);
+            let expression = Expression::random(&mut random);
+            let head = Head { anatomy: &anatomy, identity, expression };
+            directions.iter().map(|&direction| head.point(direction)).collect()
+        };
+        (0..count).into_par_iter().map(head).collect()
+    }
+
     /// What all its heads share.
     pub fn anatomy(&self) -> &Anatomy {
         &self.anatomy

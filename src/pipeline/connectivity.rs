@@ -3,13 +3,15 @@ use std::sync::{Arc, Mutex, MutexGuard, OnceLock};
 
 use glam::Vec3A;
 
-use crate::mesh::Topology;
+use crate::mesh::{Rim, Topology};
 use crate::numeric::{Dissection, SparseCholesky, SymmetricMatrix};
 
 /// The triangles of a template with what is made for them once and kept: topology, elimination order, factors.
 pub struct Connectivity {
     /// Triangles, edges and rings.
     pub topology: Topology,
+    /// Where they end.
+    pub rim: Rim,
     /// The shape `[N, 3]` that the elimination order is cut by.
     rest: Vec<Vec3A>,
     dissection: OnceLock<Dissection>,
@@ -29,6 +31,7 @@ impl Connectivity {
         let topology = Topology::new(rest.len(), triangles);
         Self {
             triangle_edges: triangle_edges(&topology),
+            rim: Rim::of(&topology),
             topology,
             rest: rest.to_vec(),
             dissection: OnceLock::new(),

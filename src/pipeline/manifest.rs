@@ -3,8 +3,8 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use super::register::Template;
 use super::settings::Settings;
+use super::template::Template;
 use crate::formats::{InputFile, Sha256};
 use crate::mesh::SurfacePoint;
 
@@ -78,7 +78,7 @@ impl TemplateEntry {
     pub fn of(template: &Template) -> Self {
         let indices: Vec<u8> = template.triangles.iter().flatten().flat_map(|i| i.to_le_bytes()).collect();
         Self {
-            vertices: template.sphere.len(),
+            vertices: template.positions.len(),
             triangles: template.triangles.len(),
             triangles_sha256: Sha256::of(&indices),
             landmarks: template.landmarks.iter().map(|(name, at)| (name.clone(), at.into())).collect(),

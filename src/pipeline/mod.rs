@@ -16,14 +16,16 @@ mod scan_surface;
 mod setting_name;
 mod settings;
 mod sphere;
+mod template;
+mod transfer;
 
 pub use comparison::comparison_sheet;
 pub use connectivity::Connectivity;
 pub use fit::{SphereLandmark, fit};
 pub use manifest::{InputEntry, LandmarkEntry, Manifest, ScanEntry, TemplateEntry};
 pub use observer::{Canceled, Observer, Progress, Stage, Watch};
-pub use package::{Package, PackageError, layout, spare_inputs, vertex_normals};
-pub use register::{LEAST_LANDMARKS, RegisterError, Registration, Subject, Template, fit_scan, register};
+pub use package::{Package, PackageError, spare_inputs, vertex_normals};
+pub use register::{LEAST_LANDMARKS, RegisterError, Registration, Subject, fit_scan, register};
 pub use report::{Report, ScanReport};
 pub use scan_surface::{ScanSurface, SurfaceSample};
 pub use settings::{
@@ -31,3 +33,5 @@ pub use settings::{
     Settings,
 };
 pub use sphere::Sphere;
+pub use template::Template;
+pub use transfer::register_to;

@@ -6,17 +6,17 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use glam::{DVec2, DVec3};
+use glam::DVec3;
 use rayon::prelude::*;
 use serde_json::{Value, json};
 
 use super::comparison::comparison_sheet;
 use super::manifest::{InputEntry, Manifest, ScanEntry, TemplateEntry};
-use super::register::{Registration, Subject, Template};
+use super::register::{Registration, Subject};
 use super::report::{Report, ScanReport, position};
 use super::settings::Settings;
-use crate::formats::{FormatError, Glb, InputFile, Region, Scheme, Sha256, glb_bytes, write_whole};
-use crate::mesh::{LandmarkSet, MeshError, Topology, TriangleMesh, sphere_layout};
+use crate::formats::{FormatError, Glb, InputFile, Sha256, glb_bytes, write_whole};
+use crate::mesh::{MeshError, TriangleMesh};
 use crate::picture::PictureError;
 
 /// Version of manifest and report.
@@ -87,14 +87,13 @@ impl Package<'_> {
             .map_err(|error| PackageError::Folder { path: folder.to_owned(), error })?;
         spare_inputs(folder, self.subjects, self.inputs)?;
         let results = self.results()?;
-        let layout = layout(&self.registration.template, self.scheme());
         let scans = self
             .subjects
             .par_iter()
             .zip(&results)
             .map(|(subject, result)| {
                 let report = ScanReport::of(subject, result, &self.registration.template);
-                let bytes = self.glb(subject, result, &report, &layout)?;
+                let bytes = self.glb(subject, result, &report)?;
                 write_whole(folder.join(file_of(&subject.name)), &bytes)?;
                 Ok((report, Sha256::of(&bytes)))
             })
@@ -117,21 +116,16 @@ impl Package<'_> {
         self.subjects.iter().zip(members).map(result).collect()
     }
 
-    fn scheme(&self) -> Option<&str> {
-        self.subjects.iter().find_map(|subject| subject.landmarks.scheme.as_deref())
-    }
-
     fn glb(
         &self,
         subject: &Subject,
         result: &TriangleMesh,
         report: &ScanReport,
-        layout: &[DVec2],
     ) -> Result<Vec<u8>, FormatError> {
         let glb = Glb {
             name: &subject.name,
             normals: Some(&vertex_normals(result)),
-            texture_coordinates: Some(layout),
+            texture_coordinates: self.registration.template.texture_coordinates.as_deref(),
             scalars: vec![("_RESIDUAL", &report.fidelity.residuals)],
             extras: self.extras(result),
             ..Glb::new(result)
@@ -146,7 +140,7 @@ impl Package<'_> {
             json!({ "name": name, "position": on_result, "triangle": at.triangle.0, "weights": at.weights })
         });
         let landmarks: Vec<Value> = landmarks.collect();
-        match self.scheme() {
+        match &self.registration.template.scheme {
             Some(scheme) => json!({ "scheme": scheme, "landmarks": landmarks }),
             None => json!({ "landmarks": landmarks }),
         }
@@ -220,27 +214,4 @@ pub fn vertex_normals(mesh: &TriangleMesh) -> Vec<DVec3> {
         corners.iter().for_each(|&i| normals[i as usize] += normal);
     }
     normals
-}
-
-/// Texture coordinates `[N, 2]` of a template: its landmarks say where the face is and, in a known scheme, which way is
-/// up; the sphere's +Z and +Y do where they do not.
-pub fn layout(template: &Template, scheme: Option<&str>) -> Vec<DVec2> {
-    let topology = Topology::new(template.sphere.len(), &template.triangles);
-    let on_sphere = |at: &crate::mesh::SurfacePoint| -> DVec3 {
-        let corners = template.triangles[at.triangle.0 as usize];
-        corners.iter().zip(at.weights).map(|(&i, weight)| template.sphere[i as usize] * weight).sum()
-    };
-    let (names, points): (Vec<_>, Vec<_>) =
-        template.landmarks.iter().map(|(name, at)| (name.clone(), Some(on_sphere(at)))).unzip();
-    let face = points.iter().flatten().sum::<DVec3>();
-    let landmarks = LandmarkSet { scheme: None, names, points };
-    let up = scheme.and_then(Scheme::named).and_then(|scheme| upwards(scheme, &landmarks));
-    sphere_layout(&topology, &template.sphere, face, up.unwrap_or(DVec3::Y))
-}
-
-/// From the lips to the eyes.
-fn upwards(scheme: &Scheme, landmarks: &LandmarkSet) -> Option<DVec3> {
-    let centre = |region| scheme.centre(region, landmarks);
-    let eyes = centre(Region::RightEye)? + centre(Region::LeftEye)?;
-    Some(eyes / 2.0 - centre(Region::OuterLips)?)
 }

@@ -26,6 +26,7 @@ impl Settings {
                 resample,
                 register: paper(level),
                 groupwise: GroupwiseSettings { rounds: 0, ..groupwise() },
+                transfer: transfer(),
             },
             Preset::Default => Self {
                 preset,
@@ -34,6 +35,7 @@ impl Settings {
                 resample,
                 register: coarse_to_fine(level.min(4), 150),
                 groupwise: groupwise(),
+                transfer: transfer(),
             },
         })
     }
@@ -116,6 +118,16 @@ fn level(level: u32, iterations: usize) -> LevelSettings {
     }
 }
 
+/// A given template has the shape of what it is laid on: less has to be found, and folds are worse than distance.
+fn transfer() -> GroupwiseSettings {
+    GroupwiseSettings {
+        stiffness: [1000.0, 0.05],
+        smoothing: [1000.0, 1.0],
+        normal_search: [0.05, 0.02],
+        ..groupwise()
+    }
+}
+
 fn groupwise() -> GroupwiseSettings {
     GroupwiseSettings {
         rounds: 2,
@@ -125,7 +137,7 @@ fn groupwise() -> GroupwiseSettings {
         phases: 12,
         iterations: 5,
         stiffness: [1000.0, 0.02],
-        smoothing: [3000.0, 4.0],
+        smoothing: [3000.0, 1.0],
         landmark_weight: 60.0,
         normal_search: [0.1, 0.02],
         reach: [0.3, 0.03],

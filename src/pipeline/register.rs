@@ -13,13 +13,14 @@ use super::resample;
 use super::scan_surface::ScanSurface;
 use super::settings::{FitSettings, Settings};
 use super::sphere::Sphere;
+use super::template::Template;
 use crate::energy::LandmarkPull;
 use crate::mesh::{Icosphere, LandmarkSet, SurfacePoint, TriangleMesh};
 use crate::numeric::Similarity;
 use crate::spatial::SurfaceIndex;
 
 /// Samples of a scan that fits draw from.
-const SAMPLES: usize = 120_000;
+pub(super) const SAMPLES: usize = 120_000;
 
 /// Samples a registration is judged by when the mean is taken.
 const JUDGED: usize = 10_000;
@@ -33,19 +34,6 @@ pub struct Subject {
     pub mesh: TriangleMesh,
     /// Its landmarks, in the same space.
     pub landmarks: LandmarkSet,
-}
-
-/// The template of a registered collection.
-#[derive(Debug, Clone)]
-pub struct Template {
-    /// Vertex positions `[N, 3]` on the unit sphere.
-    pub sphere: Vec<DVec3>,
-    /// The triangles that every result shares `[F, 3]`.
-    pub triangles: Vec<[u32; 3]>,
-    /// Where each landmark lies on it.
-    pub landmarks: BTreeMap<String, SurfacePoint>,
-    /// The mean shape `[N, 3]` of the collection in unit space, after a groupwise stage.
-    pub mean: Option<Vec<Vec3A>>,
 }
 
 /// A registered collection.
@@ -75,6 +63,17 @@ pub enum RegisterError {
         found: usize,
         /// Which.
         names: String,
+    },
+    /// Too few landmarks in common with the template.
+    #[error(
+        "scan `{scan}` has {found} of the template's landmarks; at least {LEAST_LANDMARKS} are needed: \
+         give both landmarks of the same scheme"
+    )]
+    TooFewForTemplate {
+        /// The scan.
+        scan: String,
+        /// How many.
+        found: usize,
     },
     /// Stopped on request.
     #[error(transparent)]
@@ -128,15 +127,20 @@ pub fn register(
     let back =
         |(member, shape): (&Prepared, &Vec<Vec3A>)| shape.iter().map(|p| member.scan.to_scan(*p)).collect();
     Ok(Registration {
-        template: Template {
-            sphere: sphere.rest.iter().map(|p| p.as_dvec3()).collect(),
-            triangles: sphere.connectivity.topology.triangles.clone(),
-            landmarks: run.names.iter().cloned().zip(points).collect(),
-            mean: (!mean.is_empty()).then_some(mean),
-        },
+        template: Template::of_sphere(
+            &sphere,
+            run.names.iter().cloned().zip(points),
+            &mean,
+            scheme(subjects),
+        ),
         members: members.iter().zip(&shapes).map(back).collect(),
         seconds: run.seconds,
     })
+}
+
+/// The scheme of the landmarks, where a scan names one.
+fn scheme(subjects: &[Subject]) -> Option<&str> {
+    subjects.iter().find_map(|subject| subject.landmarks.scheme.as_deref())
 }
 
 /// The landmarks that every scan has, in the first one's order.
@@ -273,7 +277,7 @@ fn pulls(points: &[SurfacePoint], targets: &[Vec3A]) -> Vec<LandmarkPull> {
 }
 
 /// A shape moved onto another of the same vertices by a similarity.
-fn moved_onto(shape: &[Vec3A], other: &[Vec3A]) -> Vec<Vec3A> {
+pub(super) fn moved_onto(shape: &[Vec3A], other: &[Vec3A]) -> Vec<Vec3A> {
     let from: Vec<DVec3> = shape.iter().map(|p| p.as_dvec3()).collect();
     let to: Vec<DVec3> = other.iter().map(|p| p.as_dvec3()).collect();
     let similarity = Similarity::between(&from, &to, &vec![1.0; from.len()]);

@@ -2,7 +2,8 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use super::register::{Subject, Template};
+use super::register::Subject;
+use super::template::Template;
 use crate::evaluate::Fidelity;
 use crate::mesh::{SurfacePoint, TriangleMesh};
 

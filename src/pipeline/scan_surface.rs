@@ -1,7 +1,7 @@
 use glam::{DMat3, DVec3, Vec3A};
 use rayon::prelude::*;
 
-use crate::mesh::{Normals, Topology, TriangleMesh, interpolate};
+use crate::mesh::{Normals, Rim, Topology, TriangleMesh, interpolate};
 use crate::numeric::Random;
 use crate::spatial::{Hit, SurfaceIndex, SurfaceWalk};
 
@@ -35,9 +35,7 @@ pub struct ScanSurface {
     pub samples: Vec<SurfaceSample>,
     /// Unit normals per vertex, interpolated by [`ScanSurface::normal_at`].
     normals: Vec<Vec3A>,
-    /// Which sides of each triangle (opposite its first, second, third corner) are on a rim.
-    rim_sides: Vec<[bool; 3]>,
-    rim_vertices: Vec<bool>,
+    rim: Rim,
 }
 
 impl ScanSurface {
@@ -71,8 +69,7 @@ impl ScanSurface {
             positions,
             samples,
             normals: normals.vertices,
-            rim_sides: rim_sides(&topology),
-            rim_vertices: topology.on_rim,
+            rim: Rim::of(&topology),
         }
     }
 
@@ -99,26 +96,8 @@ impl ScanSurface {
 
     /// Whether a point of the scan lies on its rim: there the data ends.
     pub fn on_rim(&self, hit: &Hit) -> bool {
-        let t = hit.triangle as usize;
-        let on_side = (0..3).any(|k| hit.weights[k] <= 1e-6 && self.rim_sides[t][k]);
-        let on_vertex = (0..3).any(|k| {
-            hit.weights[k] >= 1.0 - 1e-6 && self.rim_vertices[self.index.triangles()[t][k] as usize]
-        });
-        on_side || on_vertex
+        self.rim.contains(hit.triangle, hit.weights)
     }
-}
-
-fn rim_sides(topology: &Topology) -> Vec<[bool; 3]> {
-    let mut sides = vec![[false; 3]; topology.triangles.len()];
-    for (&[a, b], &[left, right]) in topology.edges.iter().zip(&topology.edge_triangles) {
-        if left == right {
-            let t = left as usize;
-            for (side, corner) in sides[t].iter_mut().zip(topology.triangles[t]) {
-                *side |= corner != a && corner != b;
-            }
-        }
-    }
-    sides
 }
 
 /// Rounds of averaging the normals before their turning is taken for the shape's and not the noise's.

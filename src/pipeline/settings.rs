@@ -30,6 +30,9 @@ pub struct Settings {
     pub register: FitSettings,
     /// The groupwise stage; zero rounds leave it out.
     pub groupwise: GroupwiseSettings,
+    /// Registration from a given template. After each of its rounds but the last the mean takes the template's place,
+    /// so that what lies between landmarks corresponds; from the template of a frozen collection there is one round.
+    pub transfer: GroupwiseSettings,
 }
 
 /// A sphere deformed to a scan, coarse to fine.

@@ -82,8 +82,11 @@ impl Sphere {
     }
 
     /// The positions on the sphere of surface points.
-    pub fn directions(&self, points: &[SurfacePoint]) -> impl Iterator<Item = DVec3> {
-        points.iter().map(|point| {
+    pub fn directions<'a>(
+        &'a self,
+        points: impl IntoIterator<Item = &'a SurfacePoint>,
+    ) -> impl Iterator<Item = DVec3> {
+        points.into_iter().map(|point| {
             let corners = self.connectivity.topology.triangles[point.triangle.0 as usize];
             corners.iter().zip(point.weights).map(|(&i, w)| self.rest[i as usize].as_dvec3() * w).sum()
         })

@@ -1,10 +1,11 @@
 use std::hint::black_box;
 
 use glam::Vec3A;
-use onemesh::mesh::{Icosphere, Normals, Topology, TriangleMesh, mean_edge_lengths};
+use onemesh::mesh::{Icosphere, LandmarkSet, Normals, Topology, TriangleMesh, mean_edge_lengths};
 use onemesh::numeric::{Dissection, SolveBuffer, SparseCholesky, SymmetricMatrix};
 use onemesh::pipeline::ScanSurface;
-use onemesh::spatial::SurfaceIndex;
+use onemesh::preflight::Inspection;
+use onemesh::spatial::{SurfaceIndex, self_intersections};
 
 use super::clock::Clock;
 
@@ -74,4 +75,24 @@ pub fn iteration(clock: &Clock) {
         black_box(SurfaceIndex::new(&positions, &topology.triangles));
     });
     clock.kernel("iteration: search tree refitted", || index.refit(&positions));
+}
+
+/// What is looked at before a registration, and where a surface passes through itself.
+pub fn inspection(clock: &Clock, name: &str, mesh: &TriangleMesh, landmarks: Option<&LandmarkSet>) {
+    let with = landmarks.map_or(String::new(), |set| format!(" and {} landmarks", set.names.len()));
+    clock.kernel(&format!("inspection of the scan{with} ({name})"), || {
+        black_box(Inspection::new(mesh, landmarks));
+    });
+    clock.kernel(&format!("self-intersections ({name})"), || {
+        black_box(self_intersections(mesh.positions(), mesh.triangles()));
+    });
+}
+
+/// Self-intersections of a template as large as results are.
+pub fn self_intersection(clock: &Clock) {
+    let (topology, positions) = sphere(10242);
+    let positions: Vec<_> = positions.iter().map(|p| p.as_dvec3()).collect();
+    clock.kernel("self-intersections, 20480 triangles", || {
+        black_box(self_intersections(&positions, &topology.triangles));
+    });
 }

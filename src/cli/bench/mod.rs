@@ -11,7 +11,7 @@ use std::path::PathBuf;
 use anyhow::Context;
 use onemesh::demo::{SculptedHead, Sculptor, Settings};
 use onemesh::formats::read_mesh;
-use onemesh::mesh::TriangleMesh;
+use onemesh::mesh::{LandmarkSet, TriangleMesh};
 
 use clock::Clock;
 
@@ -65,9 +65,10 @@ impl Bench {
             }
         }
         let finest = if self.quick { 10242 } else { 40962 };
-        for (name, scan) in scans_of(&scans, sculpted)? {
+        for Bed { name, scan, landmarks } in beds(&scans, sculpted)? {
             if self.does(Part::Kernels) {
                 kernels::nearest_points(&clock, &name, &scan);
+                kernels::inspection(&clock, &name, &scan, landmarks.as_ref());
             }
             if self.does(Part::Readers) {
                 readers::readers(&clock, &name, &scan)?;
@@ -80,12 +81,13 @@ impl Bench {
             }
         }
         if self.does(Part::Fits) && sculpted && !self.quick {
-            let large = sculpted_scan(MANY_TRIANGLES);
-            stages::fits(&clock, &large.0, &large.1, 10242)?;
+            let large = Bed::sculpted(MANY_TRIANGLES);
+            stages::fits(&clock, &large.name, &large.scan, 10242)?;
         }
         if self.does(Part::Kernels) {
             kernels::solves(&clock, finest);
             kernels::iteration(&clock);
+            kernels::self_intersection(&clock);
         }
         Ok(())
     }
@@ -99,21 +101,35 @@ fn is_collection(path: &std::path::Path) -> bool {
     path.is_dir() || path.extension().is_some_and(|extension| extension == "json")
 }
 
-fn scans_of(paths: &[PathBuf], sculpted: bool) -> anyhow::Result<Vec<(String, TriangleMesh)>> {
-    if sculpted {
-        return Ok(vec![sculpted_scan(TRIANGLES)]);
-    }
-    let read = |path: &PathBuf| {
-        let mesh = read_mesh(path).with_context(|| "a scan to fit")?;
-        let name = path.file_stem().unwrap_or_default().to_string_lossy();
-        Ok((format!("{name}, {} triangles", mesh.triangles().len()), mesh))
-    };
-    paths.iter().map(read).collect()
+/// A scan to time work on.
+struct Bed {
+    name: String,
+    scan: TriangleMesh,
+    landmarks: Option<LandmarkSet>,
 }
 
-fn sculpted_scan(triangles: usize) -> (String, TriangleMesh) {
-    let mesh = sculpt(1, triangles).remove(0).mesh;
-    (format!("sculpted, {} triangles", mesh.triangles().len()), mesh)
+impl Bed {
+    fn sculpted(triangles: usize) -> Self {
+        let SculptedHead { mesh: scan, landmarks, .. } = sculpt(1, triangles).remove(0);
+        Self {
+            name: format!("sculpted, {} triangles", scan.triangles().len()),
+            scan,
+            landmarks: Some(landmarks),
+        }
+    }
+}
+
+fn beds(paths: &[PathBuf], sculpted: bool) -> anyhow::Result<Vec<Bed>> {
+    if sculpted {
+        return Ok(vec![Bed::sculpted(TRIANGLES)]);
+    }
+    let read = |path: &PathBuf| {
+        let scan = read_mesh(path).with_context(|| "a scan to fit")?;
+        let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+        let name = format!("{stem}, {} triangles", scan.triangles().len());
+        Ok(Bed { name, scan, landmarks: None })
+    };
+    paths.iter().map(read).collect()
 }
 
 /// Sculpted heads of about this many triangles.

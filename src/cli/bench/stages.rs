@@ -69,7 +69,7 @@ pub fn collection(path: &Path) -> anyhow::Result<()> {
     let settings = Settings::preset(Preset::Default, 10242)?;
     memory::forget_peak();
     let start = Instant::now();
-    let outcome = register_collection(path, &output.0, &settings)?;
+    let outcome = register_collection(path, &output.0, None, &settings)?;
     let elapsed = start.elapsed();
     let peak = memory::peak().map_or("memory unknown".to_owned(), |peak| format!("{peak:.0} MiB at most"));
     row(

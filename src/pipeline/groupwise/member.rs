@@ -28,6 +28,9 @@ const SETTLED: f64 = 0.65;
 /// Diffusion of the normals along which films fall, so that all of one falls together.
 const FALL_SMOOTHING: f64 = 16.0;
 
+/// Share of the phases after which films fall: while the shape is stiff enough to fall in one piece.
+const FALLING: f64 = 0.4;
+
 /// One scan of the collection, and where its registration begins.
 pub struct Member<'a> {
     /// The scan.
@@ -140,7 +143,7 @@ impl<'a> Registration<'a> {
             samples: if settled { settings.samples } else { settings.samples / 4 },
             // Settled, every vertex is held by the scan, whichever way it looks: none is left to stick out.
             least_cosine: if settled { -1.0 } else { settings.least_cosine },
-            fall_beyond: if settled { settings.fall_beyond } else { 0.0 },
+            fall_beyond: if x >= FALLING { settings.fall_beyond } else { 0.0 },
         };
         self.smoother = Some(self.rest.connectivity.diffusion(geometric(settings.smoothing, x)));
         if phase > 0 {
@@ -235,7 +238,7 @@ impl<'a> Registration<'a> {
         let (scan, index, settings) = (self.scan, &self.index, self.settings);
         let off: Vec<f32> =
             vertices.iter().map(|hit| hit.map_or(f32::MAX, |hit| hit.distance_squared)).collect();
-        let triangles = &self.rest.connectivity.topology.triangles;
+        let (triangles, rim) = (&self.rest.connectivity.topology.triangles, &self.rest.connectivity.rim);
         let free = |sample: &SurfaceSample, hit: &Hit| {
             let difference = sample.point - hit.point;
             let distance = difference.length();
@@ -260,7 +263,8 @@ impl<'a> Registration<'a> {
                 sample_reach * sample_reach,
                 None,
             );
-            let hit = hit.filter(|hit| free(&sample, hit))?;
+            // What lies beyond the template's rim is not for it.
+            let hit = hit.filter(|hit| !rim.contains(hit.triangle, hit.weights) && free(&sample, hit))?;
             let weight = (FAR / hit.distance_squared.sqrt().max(FAR)).min(1.0) * per_sample;
             Some(SampleHit { sample, hit, weight })
         };

@@ -1,0 +1,61 @@
+use std::path::{Path, PathBuf};
+
+use onemesh::pipeline::Subject;
+use onemesh::preflight::{AuditCase, LandmarkAudit, audit};
+
+use super::findings::print_findings;
+use super::register::read;
+
+/// Holds the landmarks of a collection against each other and against their scans.
+#[derive(Debug, clap::Args)]
+pub struct Audit {
+    /// A collection as for `register`
+    collection: PathBuf,
+    /// Prints JSON
+    #[arg(long)]
+    json: bool,
+}
+
+impl Audit {
+    /// Does it.
+    pub fn run(self) -> anyhow::Result<()> {
+        let (subjects, _) = read(&self.collection)?;
+        let audit = audit_subjects(&subjects);
+        if self.json {
+            println!("{}", serde_json::to_string_pretty(&audit)?);
+        } else {
+            print(&self.collection, &audit);
+        }
+        Ok(())
+    }
+}
+
+/// The audit of scans that have been read.
+pub fn audit_subjects(subjects: &[Subject]) -> LandmarkAudit {
+    let cases = subjects.iter().map(|Subject { name, mesh, landmarks }| AuditCase {
+        name,
+        landmarks,
+        mesh: Some(mesh),
+    });
+    audit(&cases.collect::<Vec<_>>())
+}
+
+fn print(collection: &Path, audit: &LandmarkAudit) {
+    let wrong = audit.scans.iter().filter(|scan| !scan.findings.is_empty()).count();
+    println!("{}: {wrong} of {} scans need a look", collection.display(), audit.scans.len());
+    for scan in audit.scans.iter().filter(|scan| !scan.findings.is_empty()) {
+        println!("{}", scan.name);
+        print_findings(&scan.findings);
+    }
+    let mut spread: Vec<(&String, &f64)> = audit.spread.iter().collect();
+    spread.sort_by(|a, b| b.1.total_cmp(a.1));
+    let widest: Vec<String> =
+        spread.iter().take(6).map(|(name, spread)| format!("`{name}` {:.1} %", 100.0 * **spread)).collect();
+    if !widest.is_empty() {
+        println!(
+            "{} landmarks; most spread, in the face's radius: {}",
+            audit.spread.len(),
+            widest.join(", ")
+        );
+    }
+}

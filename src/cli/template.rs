@@ -1,0 +1,46 @@
+use std::path::{Path, PathBuf};
+
+use anyhow::Context;
+use onemesh::formats::{LandmarkFile, MeshFile};
+use onemesh::pipeline::Template;
+
+/// A template of the user's.
+#[derive(Debug, clap::Args)]
+pub struct TemplateFiles {
+    /// A mesh of your own, or the `template.glb` of an earlier registration: its triangles in place of a sphere's
+    #[arg(long, value_name = "FILE")]
+    template: Option<PathBuf>,
+    /// The template's landmarks, where they do not lie in the file or beside it under its name
+    #[arg(long, value_name = "FILE", requires = "template")]
+    template_landmarks: Option<PathBuf>,
+}
+
+impl TemplateFiles {
+    /// Reads it, where one is given.
+    pub fn read(&self) -> anyhow::Result<Option<Template>> {
+        self.template.as_deref().map(|path| self.read_from(path)).transpose()
+    }
+
+    fn read_from(&self, path: &Path) -> anyhow::Result<Template> {
+        let file = MeshFile::read(path)?;
+        let landmarks = match self.template_landmarks.clone().or_else(|| beside(path)) {
+            Some(landmarks) => LandmarkFile::read(landmarks)?,
+            None => anyhow::bail!(
+                "{}: has no landmarks: lay them beside it, as {}.landmarks.json, or name them by --template-landmarks",
+                path.display(),
+                path.file_stem().unwrap_or_default().to_string_lossy(),
+            ),
+        };
+        let landmarks = landmarks.on(&file).with_context(|| path.display().to_string())?;
+        Ok(Template::of_mesh(&file.mesh, &landmarks))
+    }
+}
+
+/// The landmarks that lie beside a mesh, as `NAME.landmarks.EXTENSION` or `NAME.EXTENSION`.
+fn beside(mesh: &Path) -> Option<PathBuf> {
+    let called = |middle: &str, extension: &str| mesh.with_extension(format!("{middle}{extension}"));
+    let names = ["landmarks.", ""].into_iter();
+    names
+        .flat_map(|middle| LandmarkFile::EXTENSIONS.map(|extension| called(middle, extension)))
+        .find(|path| path.is_file())
+}

@@ -1,0 +1,107 @@
+//! Scans registered from a given template: a user's own mesh, or that of an earlier collection.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::time::Instant;
+
+use glam::{DVec3, Vec3A};
+use rayon::prelude::*;
+
+use super::connectivity::Connectivity;
+use super::groupwise::{Member, RestShape, mean_shape, register_member};
+use super::observer::{Observer, Stage, Watch};
+use super::register::{LEAST_LANDMARKS, RegisterError, Registration, SAMPLES, Subject, moved_onto};
+use super::scan_surface::ScanSurface;
+use super::settings::Settings;
+use super::template::Template;
+use crate::energy::LandmarkPull;
+use crate::mesh::SurfacePoint;
+use crate::numeric::Similarity;
+
+/// Registers every scan from the template, by the landmarks that it has in common with the template.
+///
+/// The template is laid on each scan by the similarity of those landmarks and then deformed by the energies of the
+/// groupwise stage, from stiff to soft. In further rounds the mean of the results takes the template's place; not if the
+/// template is frozen: then a scan's result is the same whatever else is registered.
+///
+/// # Errors
+/// [`RegisterError`] for an empty collection, a scan with too few of the template's landmarks, or a request to stop.
+pub fn register_to(
+    template: &Template,
+    subjects: &[Subject],
+    settings: &Settings,
+    observer: &dyn Observer,
+) -> Result<Registration, RegisterError> {
+    if subjects.is_empty() {
+        return Err(RegisterError::Empty);
+    }
+    let start = Instant::now();
+    let rest: Vec<Vec3A> = template.positions.iter().map(|p| p.as_vec3a()).collect();
+    let connectivity = Arc::new(Connectivity::new(&rest, &template.triangles));
+    let members: Vec<Laid> =
+        subjects.par_iter().map(|subject| Laid::of(template, subject)).collect::<Result<_, _>>()?;
+    let settings = &settings.transfer;
+    let rounds = if template.frozen || subjects.len() == 1 { 1 } else { settings.rounds.max(1) };
+    let per_round = settings.phases * settings.iterations;
+    let mut template = template.clone();
+    let mut shapes: Vec<Vec<Vec3A>> = members.iter().map(|member| member.start.clone()).collect();
+    for round in 0..rounds {
+        if round > 0 {
+            let mean = mean_shape(&shapes, &vec![1.0; shapes.len()]);
+            shapes = shapes.iter().map(|shape| moved_onto(&mean, shape)).collect();
+            template.positions = mean.iter().map(|p| p.as_dvec3()).collect();
+        }
+        let one = |(member, start): (&Laid, Vec<Vec3A>)| {
+            let iterations = per_round * rounds;
+            let watch = Watch { observer, stage: Stage::Register, scan: member.name, iterations };
+            let rest = RestShape::new(connectivity.clone(), start.clone());
+            let member = Member { scan: &member.scan, landmarks: &member.pulls, start };
+            register_member(&rest, member, settings, &watch, round * per_round)
+        };
+        shapes = members.par_iter().zip(shapes).map(one).collect::<Result<_, _>>()?;
+    }
+    let back = |(member, shape): (&Laid, Vec<Vec3A>)| shape.iter().map(|p| member.scan.to_scan(*p)).collect();
+    let members = members.iter().zip(shapes).map(back).collect();
+    let seconds = BTreeMap::from([(Stage::Register, start.elapsed().as_secs_f64())]);
+    Ok(Registration { template, members, seconds })
+}
+
+/// A scan with the template laid on it.
+struct Laid<'a> {
+    name: &'a str,
+    scan: ScanSurface,
+    pulls: Vec<LandmarkPull>,
+    /// The template in the scan's unit space `[N, 3]`.
+    start: Vec<Vec3A>,
+}
+
+impl<'a> Laid<'a> {
+    fn of(template: &Template, subject: &'a Subject) -> Result<Self, RegisterError> {
+        let common = common_landmarks(template, subject)?;
+        let (own, theirs): (Vec<DVec3>, Vec<DVec3>) =
+            common.iter().map(|(at, target)| (template.point(&template.positions, at), *target)).unzip();
+        let equal = vec![1.0; common.len()];
+        let rotation = Similarity::between(&theirs, &own, &equal).rotation;
+        let scan = ScanSurface::turned(&subject.mesh, rotation, SAMPLES);
+        let targets: Vec<DVec3> = theirs.iter().map(|&p| scan.to_unit(p).as_dvec3()).collect();
+        let laid = Similarity::between(&own, &targets, &equal);
+        let start = template.positions.iter().map(|&p| laid.apply(p).as_vec3a()).collect();
+        let pull =
+            |((at, _), target): (&(&SurfacePoint, DVec3), &DVec3)| LandmarkPull::new(at, target.as_vec3a());
+        let pulls = common.iter().zip(&targets).map(pull).collect();
+        Ok(Self { name: &subject.name, scan, pulls, start })
+    }
+}
+
+/// Where each landmark that both have lies on the template and on the scan.
+fn common_landmarks<'a>(
+    template: &'a Template,
+    subject: &Subject,
+) -> Result<Vec<(&'a SurfacePoint, DVec3)>, RegisterError> {
+    let on_both = |(name, at): (&String, &'a SurfacePoint)| Some((at, subject.landmarks.get(name)?));
+    let common: Vec<_> = template.landmarks.iter().filter_map(on_both).collect();
+    if common.len() < LEAST_LANDMARKS {
+        return Err(RegisterError::TooFewForTemplate { scan: subject.name.clone(), found: common.len() });
+    }
+    Ok(common)
+}

@@ -1,0 +1,45 @@
+use rayon::prelude::*;
+
+use crate::mesh::TriangleMesh;
+
+/// A triangle lower than this share of its longest side has no area to speak of.
+const FLAT: f64 = 1e-6;
+
+/// How many triangles name a vertex twice or are flat.
+pub(super) fn degenerate(mesh: &TriangleMesh) -> usize {
+    let positions = mesh.positions();
+    let is_flat = |corners: &&[u32; 3]| {
+        let [a, b, c] = corners.map(|i| positions[i as usize]);
+        let longest = (b - a).length_squared().max((c - b).length_squared()).max((a - c).length_squared());
+        (b - a).cross(c - a).length() <= FLAT * longest
+    };
+    mesh.triangles().iter().filter(is_flat).count()
+}
+
+/// How many triangles have the corners of one before them, in whatever order.
+pub(super) fn duplicate(mesh: &TriangleMesh) -> usize {
+    let sorted = |corners: &[u32; 3]| {
+        let mut corners = *corners;
+        corners.sort_unstable();
+        corners
+    };
+    let mut all: Vec<[u32; 3]> = mesh.triangles().iter().map(sorted).collect();
+    all.par_sort_unstable();
+    all.array_windows().filter(|[one, next]| one == next).count()
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+
+    use super::*;
+
+    #[test]
+    fn bad_triangles_are_counted() {
+        let positions = vec![DVec3::ZERO, DVec3::X, DVec3::Y, 2.0 * DVec3::X, DVec3::new(1.0, 1e-9, 0.0)];
+        let triangles = vec![[0, 1, 2], [0, 1, 1], [0, 1, 3], [0, 3, 4], [2, 1, 0], [1, 2, 0], [2, 3, 1]];
+        let mesh = TriangleMesh::new(positions, triangles).unwrap();
+        assert_eq!(degenerate(&mesh), 3);
+        assert_eq!(duplicate(&mesh), 2);
+    }
+}
