@@ -1,13 +1,20 @@
 use serde::{Deserialize, Serialize};
 
 use super::border::Border;
+use super::scan_quality::ScanQuality;
+use super::spacing::Spacing;
 use super::statistics::{maximum, mean, quantile};
 use super::surface::{Surface, UnitSpace};
 use super::surface_figures::{Pairs, SEEDS, flipped_share, sliver_share};
 use crate::mesh::TriangleMesh;
+use crate::spatial::self_intersections;
 
 /// Samples drawn from each surface: enough for the 99th percentile, and quick.
 const SAMPLES: usize = 50_000;
+/// Surfaces closer than this share of the scan's radius are one: about a millimetre and a half on a head.
+pub const TOLERANCE: f64 = 0.01;
+/// Or closer than so many deviations of the scan's noise.
+pub const NOISE_TOLERANCE: f64 = 3.0;
 
 /// How closely a mesh lies on its scan, in the scan's units; quicker and coarser than
 /// [`SurfaceFigures`](super::SurfaceFigures).
@@ -15,19 +22,43 @@ const SAMPLES: usize = 50_000;
 /// Mesh samples whose nearest scan point lies on the scan's rim or the edge of a hole do not count: no data there.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Fidelity {
+    /// What the scan can be held to.
+    pub scan: ScanQuality,
     /// From points of the scan to the mesh.
     pub scan_to_mesh: Option<Distances>,
     /// From points of the mesh to the scan.
     pub mesh_to_scan: Option<Distances>,
+    /// How much of either surface the other has.
+    pub coverage: Coverage,
     /// Mean squared difference of unit normals at those pairs, the mean of the two ways.
     pub normal: Option<f64>,
     /// Share of mesh triangles that face away from the scan's surface at their centre.
     pub flipped: f64,
     /// Share of mesh triangles with a quality under 0.1 (1 equilateral, 0 degenerate).
     pub sliver: f64,
+    /// Share of mesh triangles that meet another one where they should not.
+    pub self_intersecting: f64,
+    /// Pairs of mesh triangles that do.
+    pub self_intersections: usize,
+    /// Where the mesh has its vertices.
+    pub spacing: Spacing,
     /// Distance of each mesh vertex from the scan `[N]`.
     #[serde(skip)]
     pub residuals: Vec<f64>,
+}
+
+/// How much of either surface the other has.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Coverage {
+    /// The distance up to which surfaces count as one: 1 % of the scan's radius, or three deviations of its noise if
+    /// these are more.
+    pub tolerance: f64,
+    /// Share of the scan's area within it of the mesh.
+    pub scan: f64,
+    /// Share of the mesh's area that is over the scan, and not beyond its rim or over a hole of it.
+    pub mesh_over_scan: f64,
+    /// Share of that area within the tolerance of the scan.
+    pub mesh: f64,
 }
 
 /// How distances are spread.
@@ -48,6 +79,9 @@ pub struct Distances {
 impl Fidelity {
     /// Measures `mesh` against `scan`.
     pub fn of(scan: &TriangleMesh, mesh: &TriangleMesh) -> Self {
+        let quality = ScanQuality::of(scan);
+        let spacing = Spacing::of(mesh);
+        let meeting = self_intersections(mesh.positions(), mesh.triangles());
         let space = UnitSpace::of(scan);
         let (scan, mesh) = (Surface::new(scan, &space), Surface::new(mesh, &space));
         let border = Border::of(scan.positions.len(), scan.triangles);
@@ -55,12 +89,27 @@ impl Fidelity {
         let onto_scan = Pairs::between(&mesh, &scan, SAMPLES, SEEDS[1], |hit| !border.holds(hit));
         let normal = (mean(&onto_mesh.turns) + mean(&onto_scan.turns)) / 2.0;
         let residual = |squared: f32| f64::from(squared).sqrt() * space.radius;
+        let tolerance = (TOLERANCE * quality.radius).max(NOISE_TOLERANCE * quality.noise);
+        let within = |squares: &[f64]| {
+            let near = squares.iter().filter(|square| square.sqrt() * space.radius <= tolerance).count();
+            near as f64 / squares.len().max(1) as f64
+        };
         Self {
+            scan: quality,
+            coverage: Coverage {
+                tolerance,
+                scan: within(&onto_mesh.distances),
+                mesh_over_scan: onto_scan.distances.len() as f64 / SAMPLES as f64,
+                mesh: within(&onto_scan.distances),
+            },
             scan_to_mesh: Distances::of_squares(&onto_mesh.distances, space.radius),
             mesh_to_scan: Distances::of_squares(&onto_scan.distances, space.radius),
             normal: normal.is_finite().then_some(normal),
             flipped: flipped_share(&mesh, &scan, &border),
             sliver: sliver_share(&mesh),
+            self_intersecting: meeting.triangles.len() as f64 / mesh.triangles.len() as f64,
+            self_intersections: meeting.pairs,
+            spacing,
             residuals: scan
                 .closest(&mesh.positions)
                 .iter()
@@ -102,7 +151,22 @@ mod tests {
             assert!(p50 <= p90 && p90 <= p99 && p99 <= max);
         }
         assert_eq!((fidelity.flipped, fidelity.sliver), (0.0, 0.0));
+        assert_eq!((fidelity.self_intersecting, fidelity.self_intersections), (0.0, 0));
+        assert_eq!((fidelity.coverage.scan, fidelity.coverage.mesh), (0.0, 0.0));
         assert_eq!(fidelity.residuals.len(), 10242);
         assert!(fidelity.residuals.iter().all(|d| (d - 0.5).abs() < 0.02));
+    }
+
+    #[test]
+    fn half_a_sphere_is_covered_and_covers_half() {
+        let whole = sphere(10.0);
+        let upper = |t: &&[u32; 3]| t.iter().all(|&i| whole.positions()[i as usize].y > 0.0);
+        let triangles = whole.triangles().iter().filter(upper).copied().collect();
+        let half = TriangleMesh::new(whole.positions().to_vec(), triangles).unwrap();
+        let Coverage { tolerance, scan, mesh_over_scan, mesh } = Fidelity::of(&half, &whole).coverage;
+        assert!((tolerance - 0.1).abs() < 0.01 && scan == 1.0 && mesh == 1.0, "{tolerance} {scan} {mesh}");
+        assert!((mesh_over_scan - 0.5).abs() < 0.02, "{mesh_over_scan}");
+        let other_way = Fidelity::of(&whole, &half).coverage;
+        assert!((other_way.scan - 0.5).abs() < 0.02 && other_way.mesh == 1.0, "{other_way:?}");
     }
 }

@@ -7,6 +7,8 @@ mod curvature;
 mod dense_points;
 mod fidelity;
 mod samples;
+mod scan_quality;
+mod spacing;
 mod statistics;
 mod surface;
 mod surface_figures;
@@ -18,5 +20,7 @@ pub use correspondence::{
     correspondence_figures,
 };
 pub use dense_points::{DensePointsError, dense_points_from_json, dense_points_from_npy};
-pub use fidelity::{Distances, Fidelity};
+pub use fidelity::{Coverage, Distances, Fidelity, NOISE_TOLERANCE, TOLERANCE};
+pub use scan_quality::ScanQuality;
+pub use spacing::Spacing;
 pub use surface_figures::{SurfaceFigures, surface_figures};
