@@ -207,6 +207,35 @@ fn what_cannot_be_registered_is_said_clearly() {
 }
 
 #[test]
+fn a_collection_of_which_nothing_can_be_used_ends_in_an_error() {
+    let folder = tempfile::tempdir().unwrap();
+    let (scans, out) = (folder.path().join("scans"), folder.path().join("out"));
+    let names = write_collection(&scans, 2);
+    let change = |name: &String, how: fn(&mut Vec<Option<glam::DVec3>>)| {
+        let file = scans.join(name).join("landmarks.json");
+        let mut set = read_landmarks(&file).unwrap();
+        how(&mut set.points);
+        write_landmarks(&file, &set).unwrap();
+    };
+    change(&names[0], |points| points.swap(8, 27));
+    let output = onemesh(quick_register(&scans, &out));
+    assert!(succeeded(&output).contains("review: landmarks_swapped: `8` and `27`"));
+    assert!(String::from_utf8_lossy(&output.stderr).contains("landmarks_swapped"), "said before, too");
+    let scan = &json(out.join("report.json"))["scans"][0];
+    assert_ne!(scan["verdict"], "pass");
+    assert_eq!(scan["findings"][0]["code"], "landmarks_swapped");
+
+    let mirror = |points: &mut Vec<Option<glam::DVec3>>| points.iter_mut().flatten().for_each(|p| p.x = -p.x);
+    names.iter().for_each(|name| change(name, mirror));
+    let output = onemesh(quick_register(&scans, &out));
+    assert!(complaint(&output).contains("no result can be used: all 2 failed"));
+    assert!(String::from_utf8_lossy(&output.stdout).contains("0 pass, 0 to review, 2 failed"));
+    let report = json(out.join("report.json"));
+    assert_eq!(report["scans"][1]["verdict"], "fail");
+    assert_eq!(report["scans"][1]["reasons"][0]["verdict"], "fail");
+}
+
+#[test]
 fn wrong_parameters_are_said_clearly() {
     let said =
         |more: &[&str]| complaint(&onemesh(["register", "nowhere", "-o", "nowhere"].iter().chain(more)));

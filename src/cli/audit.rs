@@ -1,7 +1,7 @@
 use std::path::{Path, PathBuf};
 
-use onemesh::pipeline::Subject;
-use onemesh::preflight::{AuditCase, LandmarkAudit, audit};
+use onemesh::pipeline::audit_landmarks;
+use onemesh::preflight::LandmarkAudit;
 
 use super::findings::print_findings;
 use super::register::read;
@@ -20,7 +20,7 @@ impl Audit {
     /// Does it.
     pub fn run(self) -> anyhow::Result<()> {
         let (subjects, _) = read(&self.collection)?;
-        let audit = audit_subjects(&subjects);
+        let audit = audit_landmarks(&subjects);
         if self.json {
             println!("{}", serde_json::to_string_pretty(&audit)?);
         } else {
@@ -28,16 +28,6 @@ impl Audit {
         }
         Ok(())
     }
-}
-
-/// The audit of scans that have been read.
-pub fn audit_subjects(subjects: &[Subject]) -> LandmarkAudit {
-    let cases = subjects.iter().map(|Subject { name, mesh, landmarks }| AuditCase {
-        name,
-        landmarks,
-        mesh: Some(mesh),
-    });
-    audit(&cases.collect::<Vec<_>>())
 }
 
 fn print(collection: &Path, audit: &LandmarkAudit) {

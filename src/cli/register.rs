@@ -1,15 +1,14 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use anyhow::Context;
+use anyhow::{Context, ensure};
 use onemesh::formats::{Collection, InputFile, Scan};
 use onemesh::pipeline::{
-    Package, Registration, Report, Settings, Subject, Template, register, register_to, spare_inputs,
+    Package, Registration, Report, Settings, Subject, Template, Verdict, precheck, register, register_to,
+    spare_inputs,
 };
-use onemesh::preflight::Inspection;
 use rayon::prelude::*;
 
-use super::audit::audit_subjects;
 use super::findings::warn;
 use super::parameters::Parameters;
 use super::progress::ProgressBars;
@@ -37,6 +36,13 @@ impl Register {
         let template = self.template.read()?;
         let outcome = register_collection(&self.collection, &self.output, template.as_ref(), &settings)?;
         outcome.print(&self.output);
+        let failed = outcome.report.count(Verdict::Fail);
+        ensure!(
+            failed < outcome.report.scans.len(),
+            "{}: no result can be used: {}",
+            self.collection.display(),
+            if failed == 1 { "the only one failed".to_owned() } else { format!("all {failed} failed") }
+        );
         Ok(())
     }
 }
@@ -65,7 +71,10 @@ pub fn register_collection(
     let reading = start.elapsed().as_secs_f64();
     spinner.finish_and_clear();
     spare_inputs(output, &subjects, &inputs)?;
-    look_first(&subjects);
+    let prechecks = precheck(&subjects);
+    for (subject, precheck) in subjects.iter().zip(&prechecks) {
+        warn(&subject.name, &precheck.findings);
+    }
     let registration = match template {
         Some(template) => register_to(template, &subjects, settings, &bars),
         None => register(&subjects, settings, &bars),
@@ -73,22 +82,18 @@ pub fn register_collection(
     let registration = registration.with_context(|| collection.display().to_string())?;
     let spinner = bars.spinner("writing");
     let root = if collection.is_dir() { collection } else { collection.parent().unwrap_or(Path::new("")) };
-    let registered = &registration;
-    let package =
-        Package { subjects: &subjects, inputs: &inputs, root, settings, registration: registered, reading };
+    let package = Package {
+        subjects: &subjects,
+        inputs: &inputs,
+        prechecks: &prechecks,
+        root,
+        settings,
+        registration: &registration,
+        reading,
+    };
     let report = package.write(output)?;
     spinner.finish_and_clear();
     Ok(Outcome { subjects, registration, report })
-}
-
-/// Warns of what may spoil the results.
-fn look_first(subjects: &[Subject]) {
-    let inspections: Vec<Inspection> = subjects.par_iter().map(|s| Inspection::new(&s.mesh, None)).collect();
-    for ((subject, inspection), scan) in subjects.iter().zip(inspections).zip(audit_subjects(subjects).scans)
-    {
-        warn(&subject.name, &inspection.findings);
-        warn(&subject.name, &scan.findings);
-    }
 }
 
 /// The scans of a collection and the files they were read from.
@@ -111,14 +116,21 @@ impl Outcome {
             let median = fidelity.scan_to_mesh.map_or(f64::NAN, |distances| distances.p50);
             let worst = fidelity.scan_to_mesh.map_or(f64::NAN, |distances| distances.p99);
             println!(
-                "{:widest$}  distance median {median:.3e}, 99 % {worst:.3e}; landmarks {:.3e}; flipped {:.2} %, sliver {:.2} %",
+                "{:widest$}  {:6}  distance median {median:.3e}, 99 % {worst:.3e}; landmarks {:.3e}; flipped {:.2} %, sliver {:.2} %",
                 scan.name,
+                scan.verdict,
                 scan.landmark_mean,
                 100.0 * fidelity.flipped,
                 100.0 * fidelity.sliver,
             );
+            for reason in &scan.reasons {
+                println!("{:widest$}  - {}: {reason}", "", reason.verdict);
+            }
         }
         let seconds: f64 = self.report.seconds.values().sum();
+        let [pass, review, fail] =
+            [Verdict::Pass, Verdict::Review, Verdict::Fail].map(|verdict| self.report.count(verdict));
+        println!("{pass} pass, {review} to review, {fail} failed");
         println!("{} scans in {seconds:.1} s: {}", self.report.scans.len(), output.display());
         println!("look at {}", output.join("sheet.png").display());
     }

@@ -8,6 +8,7 @@ mod manifest;
 mod matching;
 mod observer;
 mod package;
+mod precheck;
 mod presets;
 mod register;
 mod report;
@@ -18,6 +19,7 @@ mod settings;
 mod sphere;
 mod template;
 mod transfer;
+mod verdict;
 
 pub use comparison::comparison_sheet;
 pub use connectivity::Connectivity;
@@ -25,6 +27,7 @@ pub use fit::{SphereLandmark, fit};
 pub use manifest::{InputEntry, LandmarkEntry, Manifest, ScanEntry, TemplateEntry};
 pub use observer::{Canceled, Observer, Progress, Stage, Watch};
 pub use package::{Package, PackageError, spare_inputs, vertex_normals};
+pub use precheck::{Precheck, audit_landmarks, precheck};
 pub use register::{LEAST_LANDMARKS, RegisterError, Registration, Subject, fit_scan, register};
 pub use report::{Report, ScanReport};
 pub use scan_surface::{ScanSurface, SurfaceSample};
@@ -35,3 +38,4 @@ pub use settings::{
 pub use sphere::Sphere;
 pub use template::Template;
 pub use transfer::register_to;
+pub use verdict::{CRITERIA, Criterion, Reason, Verdict, Worse, verdict_of};

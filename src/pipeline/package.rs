@@ -12,6 +12,7 @@ use serde_json::{Value, json};
 
 use super::comparison::comparison_sheet;
 use super::manifest::{InputEntry, Manifest, ScanEntry, TemplateEntry};
+use super::precheck::Precheck;
 use super::register::{Registration, Subject};
 use super::report::{Report, ScanReport, position};
 use super::settings::Settings;
@@ -32,6 +33,8 @@ pub struct Package<'a> {
     pub subjects: &'a [Subject],
     /// The files each was read from.
     pub inputs: &'a [Vec<InputFile>],
+    /// What was known of each before.
+    pub prechecks: &'a [Precheck],
     /// The folder of the collection; the manifest names its files from there.
     pub root: &'a Path,
     /// What was used.
@@ -90,9 +93,10 @@ impl Package<'_> {
         let scans = self
             .subjects
             .par_iter()
+            .zip(self.prechecks)
             .zip(&results)
-            .map(|(subject, result)| {
-                let report = ScanReport::of(subject, result, &self.registration.template);
+            .map(|((subject, precheck), result)| {
+                let report = ScanReport::of(subject, precheck, result, &self.registration.template);
                 let bytes = self.glb(subject, result, &report)?;
                 write_whole(folder.join(file_of(&subject.name)), &bytes)?;
                 Ok((report, Sha256::of(&bytes)))

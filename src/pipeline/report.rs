@@ -2,8 +2,10 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
+use super::precheck::Precheck;
 use super::register::Subject;
 use super::template::Template;
+use super::verdict::{Reason, Verdict};
 use crate::evaluate::Fidelity;
 use crate::mesh::{SurfacePoint, TriangleMesh};
 
@@ -25,6 +27,13 @@ pub struct Report {
 pub struct ScanReport {
     /// The scan's name.
     pub name: String,
+    /// Whether the result can be used.
+    pub verdict: Verdict,
+    /// Why not as it is, the worst first; empty if it passes.
+    pub reasons: Vec<Reason>,
+    /// What was known before.
+    #[serde(flatten)]
+    pub precheck: Precheck,
     /// Distances, normals and the state of the triangles.
     #[serde(flatten)]
     pub fidelity: Fidelity,
@@ -35,19 +44,32 @@ pub struct ScanReport {
 }
 
 impl ScanReport {
-    /// Holds a result against its scan.
-    pub fn of(subject: &Subject, result: &TriangleMesh, template: &Template) -> Self {
+    /// Holds a result against its scan, and judges it.
+    pub fn of(subject: &Subject, precheck: &Precheck, result: &TriangleMesh, template: &Template) -> Self {
         let residual = |(name, at): (&String, &SurfacePoint)| {
             let target = subject.landmarks.get(name)?;
             Some((name.clone(), position(result, at).distance(target)))
         };
         let landmarks: BTreeMap<String, f64> = template.landmarks.iter().filter_map(residual).collect();
-        Self {
+        let mut report = Self {
             name: subject.name.clone(),
+            verdict: Verdict::Pass,
+            reasons: Vec::new(),
+            precheck: precheck.clone(),
             fidelity: Fidelity::of(&subject.mesh, result),
             landmark_mean: landmarks.values().sum::<f64>() / landmarks.len().max(1) as f64,
             landmarks,
-        }
+        };
+        report.reasons = Reason::all_of(&report);
+        report.verdict = report.reasons.first().map_or(Verdict::Pass, |worst| worst.verdict);
+        report
+    }
+}
+
+impl Report {
+    /// How many scans have this verdict.
+    pub fn count(&self, verdict: Verdict) -> usize {
+        self.scans.iter().filter(|scan| scan.verdict == verdict).count()
     }
 }
 
