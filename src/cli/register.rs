@@ -33,8 +33,11 @@ pub struct Register {
 impl Register {
     /// Does it.
     pub fn run(self) -> anyhow::Result<()> {
-        let settings = self.parameters.for_registration()?;
-        let template = self.template.read()?;
+        let (template, frozen) = self.template.read()?.unzip();
+        let settings = match frozen.flatten() {
+            Some(settings) => self.parameters.over_frozen(settings)?,
+            None => self.parameters.for_registration()?,
+        };
         let outcome = register_collection(&self.collection, &self.output, template.as_ref(), &settings)?;
         outcome.print(&self.output);
         Ok(())

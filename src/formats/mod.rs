@@ -30,6 +30,7 @@ pub use collection::{Collection, CollectionError, Member, Scan};
 pub use digest::Sha256;
 pub use error::{Fault, FormatError};
 pub use glb::{Glb, glb_bytes, write_glb};
+pub use gltf::scene_extras;
 pub use input::InputFile;
 pub use landmarks::{LandmarkFile, landmarks_json, parse_landmarks, read_landmarks, write_landmarks};
 pub use mesh_file::MeshFile;

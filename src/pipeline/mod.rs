@@ -3,6 +3,7 @@
 mod comparison;
 mod connectivity;
 mod fit;
+mod frozen;
 mod groupwise;
 mod manifest;
 mod matching;
@@ -22,6 +23,7 @@ mod transfer;
 pub use comparison::comparison_sheet;
 pub use connectivity::Connectivity;
 pub use fit::{SphereLandmark, fit};
+pub use frozen::{FrozenCollection, FrozenError};
 pub use manifest::{InputEntry, LandmarkEntry, Manifest, ScanEntry, TemplateEntry};
 pub use observer::{Canceled, Observer, Progress, Stage, Watch};
 pub use package::{Package, PackageError, spare_inputs, vertex_normals};
