@@ -8,19 +8,24 @@ use rayon::prelude::*;
 
 use super::fit::{SphereLandmark, fit};
 use super::groupwise::{Member, RestShape, SharedMesh, mean_shape, register_member};
+use super::head::{self, head};
 use super::observer::{Canceled, Observer, Stage, Watch};
 use super::resample;
 use super::scan_surface::ScanSurface;
 use super::settings::{FitSettings, Settings};
 use super::sphere::Sphere;
 use super::template::Template;
+use super::transfer::register_to;
 use crate::energy::LandmarkPull;
-use crate::mesh::{Icosphere, LandmarkSet, SurfacePoint, TriangleMesh};
+use crate::mesh::{Icosphere, LandmarkSet, SurfacePoint, TriangleMesh, interpolate};
 use crate::numeric::Similarity;
 use crate::spatial::SurfaceIndex;
 
 /// Samples of a scan that fits draw from.
 pub(super) const SAMPLES: usize = 120_000;
+
+/// The finest level of the head that comes with the program.
+const HEAD_LEVEL: u32 = 5;
 
 /// Samples a registration is judged by when the mean is taken.
 const JUDGED: usize = 10_000;
@@ -111,15 +116,15 @@ pub fn register(
 ) -> Result<Registration, RegisterError> {
     let names = common_landmarks(subjects)?;
     let mut run = Run { settings, observer, names, seconds: BTreeMap::new() };
+    if subjects.len() == 1 && run.starts_from_head(subjects) && settings.vertices == head().positions.len() {
+        return register_to(head(), subjects, settings, observer);
+    }
     let members = run.timed(Stage::Prepare, |run| run.prepare(subjects));
-    let fits = run.timed(Stage::Fit, |run| run.fit_all(Stage::Fit, &members, &run.settings.fit, &[]))?;
-    let on_sphere = run.timed(Stage::Resample, |run| run.resample(&members, &fits));
-    let shapes = run.timed(Stage::Register, |run| {
-        run.fit_all(Stage::Register, &members, &run.settings.register, &on_sphere)
-    })?;
-    let sphere = Sphere::of_level(last_level(&settings.register));
-    let points = sphere.surface_points(on_sphere.iter().copied());
-    let mut shared = SharedMesh { sphere, points, shapes, mean: Vec::new() };
+    let mut shared = if run.starts_from_head(subjects) {
+        run.timed(Stage::Prepare, |run| run.lay_head(&members))
+    } else {
+        run.deform_sphere(&members)?
+    };
     if settings.groupwise.rounds > 0 {
         shared = run.timed(Stage::Groupwise, |run| run.groupwise(&members, shared))?;
     }
@@ -180,6 +185,47 @@ impl Run<'_> {
         let result = work(self);
         self.seconds.insert(stage, start.elapsed().as_secs_f64());
         result
+    }
+
+    fn starts_from_head(&self, subjects: &[Subject]) -> bool {
+        let settings = self.settings;
+        settings.from_head
+            && settings.groupwise.rounds > 0
+            && last_level(&settings.register) <= HEAD_LEVEL
+            && head::has_landmarks(&self.names, scheme(subjects))
+    }
+
+    /// The head that comes with the program, laid on every member by the landmarks.
+    fn lay_head(&self, members: &[Prepared]) -> SharedMesh {
+        let sphere = Sphere::of_level(last_level(&self.settings.register));
+        let points = sphere.surface_points(head::directions(&self.names));
+        let head = head::positions(sphere.level);
+        let on_head: Vec<DVec3> = points
+            .iter()
+            .map(|at| {
+                let corners = sphere.connectivity.topology.triangles[at.triangle.0 as usize];
+                interpolate(&head, corners, at.weights.map(|w| w as f32)).as_dvec3()
+            })
+            .collect();
+        let equal = vec![1.0; on_head.len()];
+        let lay = |member: &Prepared| {
+            let targets: Vec<DVec3> = member.landmarks.iter().map(|p| p.as_dvec3()).collect();
+            let similarity = Similarity::between(&on_head, &targets, &equal);
+            head.iter().map(|p| similarity.apply(p.as_dvec3()).as_vec3a()).collect()
+        };
+        SharedMesh { shapes: members.iter().map(lay).collect(), sphere, points, mean: Vec::new() }
+    }
+
+    /// The paper's stages: fit, resample, register.
+    fn deform_sphere(&mut self, members: &[Prepared]) -> Result<SharedMesh, Canceled> {
+        let fits = self.timed(Stage::Fit, |run| run.fit_all(Stage::Fit, members, &run.settings.fit, &[]))?;
+        let on_sphere = self.timed(Stage::Resample, |run| run.resample(members, &fits));
+        let shapes = self.timed(Stage::Register, |run| {
+            run.fit_all(Stage::Register, members, &run.settings.register, &on_sphere)
+        })?;
+        let sphere = Sphere::of_level(last_level(&self.settings.register));
+        let points = sphere.surface_points(on_sphere);
+        Ok(SharedMesh { sphere, points, shapes, mean: Vec::new() })
     }
 
     fn prepare<'s>(&self, subjects: &'s [Subject]) -> Vec<Prepared<'s>> {

@@ -21,6 +21,9 @@ const INERTIA: f64 = 0.1;
 /// Matches farther than this pull towards the sample itself; nearer ones more and more only along its normal.
 const FAR: f32 = 0.03;
 
+/// Cosine between normals of surfaces that do not belong together.
+const TURNED: f32 = 0.5;
+
 /// Share of the phases after which far samples no longer lead: the template lies on the scan, follows what is near, and
 /// every vertex is held by some point of it.
 const SETTLED: f64 = 0.65;
@@ -212,7 +215,10 @@ impl<'a> Registration<'a> {
                 Some(*hint),
             )?;
             *hint = hit.triangle;
-            (!scan.on_rim(&hit)).then_some(hit)
+            // What closes an open scan from within hangs between its walls, which are not for it.
+            let (normal, difference) = (scan.normal_at(&hit), p[i] - hit.point);
+            let within = difference.dot(normal) < -FAR && normals[i].dot(normal) < TURNED;
+            (!within && !scan.on_rim(&hit)).then_some(hit)
         };
         self.hints.par_iter_mut().enumerate().with_min_len(128).map(closest).collect()
     }
