@@ -69,7 +69,7 @@ pub fn read(collection: &Path) -> anyhow::Result<(Vec<Subject>, Vec<Vec<InputFil
     let scans: Result<Vec<Scan>, _> = collection.members().par_iter().map(|member| member.read()).collect();
     let split = |scan: Scan| {
         let Scan { name, mesh, landmarks, inputs } = scan;
-        (Subject { name, mesh, landmarks }, inputs)
+        (Subject { name, mesh, landmarks, mask: None }, inputs)
     };
     Ok(scans?.into_iter().map(split).unzip())
 }

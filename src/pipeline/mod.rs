@@ -1,6 +1,7 @@
 //! The paper's stages over a collection: fit, resample, register, and what we add to them. Layer 4.
 
 mod comparison;
+mod confidence;
 mod connectivity;
 mod fit;
 mod groupwise;
@@ -16,8 +17,10 @@ mod scan_surface;
 mod setting_name;
 mod settings;
 mod sphere;
+mod strays;
 
 pub use comparison::comparison_sheet;
+pub use confidence::confidence;
 pub use connectivity::Connectivity;
 pub use fit::{SphereLandmark, fit};
 pub use manifest::{InputEntry, LandmarkEntry, Manifest, ScanEntry, TemplateEntry};

@@ -92,9 +92,10 @@ impl Package<'_> {
             .subjects
             .par_iter()
             .zip(&results)
-            .map(|(subject, result)| {
-                let report = ScanReport::of(subject, result, &self.registration.template);
-                let bytes = self.glb(subject, result, &report, &layout)?;
+            .zip(&self.registration.confidence)
+            .map(|((subject, result), confidence)| {
+                let report = ScanReport::of(subject, result, confidence, &self.registration.template);
+                let bytes = self.glb(subject, result, &report, confidence, &layout)?;
                 write_whole(folder.join(file_of(&subject.name)), &bytes)?;
                 Ok((report, Sha256::of(&bytes)))
             })
@@ -126,13 +127,15 @@ impl Package<'_> {
         subject: &Subject,
         result: &TriangleMesh,
         report: &ScanReport,
+        confidence: &[f32],
         layout: &[DVec2],
     ) -> Result<Vec<u8>, FormatError> {
+        let confidence: Vec<f64> = confidence.iter().copied().map(f64::from).collect();
         let glb = Glb {
             name: &subject.name,
             normals: Some(&vertex_normals(result)),
             texture_coordinates: Some(layout),
-            scalars: vec![("_RESIDUAL", &report.fidelity.residuals)],
+            scalars: vec![("_RESIDUAL", &report.fidelity.residuals), ("_CONFIDENCE", &confidence)],
             extras: self.extras(result),
             ..Glb::new(result)
         };
