@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use super::confidence::confidence;
 use super::fit::{SphereLandmark, fit};
-use super::groupwise::{Member, RestShape, SharedMesh, mean_shape, register_member};
+use super::groupwise::{Member, RestShape, SharedMesh, close_smoothly, mean_shape, register_member};
 use super::observer::{Canceled, Observer, Stage, Watch};
 use super::resample;
 use super::scan_surface::ScanSurface;
@@ -16,7 +16,7 @@ use super::settings::{FitSettings, Settings};
 use super::sphere::Sphere;
 use crate::energy::LandmarkPull;
 use crate::mesh::{Icosphere, LandmarkSet, SurfacePoint, TriangleMesh};
-use crate::numeric::Similarity;
+use crate::numeric::{Similarity, SolveBuffer};
 use crate::spatial::SurfaceIndex;
 
 /// Samples of a scan that fits draw from.
@@ -255,6 +255,7 @@ impl Run<'_> {
             let known = known(&shared.sphere, members, &shared.shapes);
             let trust = trust(&shared.sphere, members, &shared.shapes);
             shared.mean = mean_shape(&shared.shapes, &trust, &known);
+            close_smoothly(&shared.sphere.connectivity, &mut shared.mean, &unknown(&known));
             if round > 0 {
                 let scans: Vec<&ScanSurface> = members.iter().map(|member| &member.scan).collect();
                 shared.redistribute(&scans, settings);
@@ -294,16 +295,27 @@ fn moved_onto(shape: &[Vec3A], other: &[Vec3A], weights: &[f64]) -> Vec<Vec3A> {
 /// Weight in the mean of a vertex that its member knows nothing of: where nobody does, there is a mean all the same.
 const UNKNOWN: f64 = 0.02;
 
+/// Diffusion of how far vertices are known, so that the mean has no step where a member ends.
+const KNOWN_SMOOTHING: f64 = 10.0;
+
 /// A weight for each member's vertices in the mean `[M][N]`: a whole scan knows all of its, a part its own.
 fn known(sphere: &Sphere, members: &[Prepared], shapes: &[Vec<Vec3A>]) -> Vec<Vec<f64>> {
     let one = |(member, shape): (&Prepared, &Vec<Vec3A>)| {
         if member.scan.whole() {
             return vec![1.0; shape.len()];
         }
-        let known = confidence(&member.scan, &sphere.connectivity.topology, shape);
-        known.into_iter().map(|known| UNKNOWN + (1.0 - UNKNOWN) * f64::from(known)).collect()
+        let mut known = confidence(&member.scan, &sphere.connectivity.topology, shape);
+        let smoother = sphere.connectivity.diffusion(KNOWN_SMOOTHING);
+        smoother.solve_scalar(&mut known, &mut SolveBuffer::default());
+        known.into_iter().map(|known| f64::from(known).clamp(UNKNOWN, 1.0)).collect()
     };
     members.par_iter().zip(shapes).map(one).collect()
+}
+
+/// The vertices `[N]` that no member knows, by the members' weights `[M][N]`.
+fn unknown(known: &[Vec<f64>]) -> Vec<bool> {
+    let vertices = known.first().map_or(0, Vec::len);
+    (0..vertices).map(|i| known.iter().all(|known| known[i] < 0.25)).collect()
 }
 
 /// A weight for each member in the mean: the inverse of its mean squared distance, so that a shape that missed its scan

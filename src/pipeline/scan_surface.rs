@@ -75,15 +75,18 @@ impl ScanSurface {
         let (centre, radius) = frame(mesh, weights.as_deref());
         let positions: Vec<Vec3A> =
             mesh.positions().iter().map(|p| (rotation * (*p - centre) / radius).as_vec3a()).collect();
-        let (index, (topology, normals, samples)) = rayon::join(
+        let (index, (topology, normals, samples, open)) = rayon::join(
             || SurfaceIndex::new(&positions, mesh.triangles()),
             || {
                 let topology = Topology::of(mesh);
                 let normals = Normals::new(&topology, &positions);
                 let curvatures = curvatures(&topology, &positions, &normals.vertices);
+                let open = is_open(mesh.triangles(), &normals.area_vectors, weights.as_deref());
+                let weights =
+                    if open { Some(off_the_rim(&topology, weights.as_deref())) } else { weights.clone() };
                 let surface = Sampled { positions: &positions, normals: &normals, curvatures: &curvatures };
                 let samples = surface.samples(mesh.triangles(), weights.as_deref(), samples);
-                (topology, normals, samples)
+                (topology, normals, samples, open)
             },
         );
         Self {
@@ -94,7 +97,7 @@ impl ScanSurface {
             walk: SurfaceWalk::new(&topology),
             positions,
             samples,
-            open: is_open(mesh.triangles(), &normals.area_vectors, weights.as_deref()),
+            open,
             normals: normals.vertices,
             rim_sides: rim_sides(&topology),
             rim_vertices: topology.on_rim,
@@ -159,6 +162,12 @@ fn is_open(triangles: &[[u32; 3]], area_vectors: &[Vec3A], weights: Option<&[f32
     let weighed = || area_vectors.iter().enumerate().map(|(t, area)| *area * weight(t));
     let area: f32 = weighed().map(|e| e.length()).sum();
     weighed().sum::<Vec3A>().length() > LARGEST_OPENING * area
+}
+
+/// The weights with which a patch's samples pull: its rim is cut rather than seen, and frayed.
+fn off_the_rim(topology: &Topology, weights: Option<&[f32]>) -> Vec<f32> {
+    let weight = |i: usize| weights.map_or(1.0, |weights| weights[i]);
+    topology.on_rim.iter().enumerate().map(|(i, &on_rim)| if on_rim { 0.0 } else { weight(i) }).collect()
 }
 
 /// The mean and the largest distance from it of the vertices that count as data.
