@@ -88,11 +88,11 @@ mod tests {
                 _ => assert!((0.0..=1.0).contains(&known)),
             }
         }
-        let off: Vec<Vec3A> = on.iter().map(|p| *p * if p.x > 0.0 { 1.1 } else { 1.0 }).collect();
+        let off: Vec<Vec3A> = on.iter().map(|p| *p * if p.x > 0.5 { 1.1 } else { 1.0 }).collect();
         let known = confidence(&scan, &topology, &off);
         for (p, known) in sphere.positions.iter().zip(known) {
-            if p.z > 0.15 && p.x.abs() > 0.15 {
-                assert!(if p.x > 0.0 { known < 0.05 } else { known > 0.9 }, "{p} {known}");
+            if p.z > 0.15 && (p.x - 0.5).abs() > 0.15 {
+                assert!(if p.x > 0.5 { known < 0.05 } else { known > 0.9 }, "{p} {known}");
             }
         }
     }

@@ -1,6 +1,5 @@
 use glam::Vec3A;
 
-use crate::mesh::Topology;
 use crate::numeric::{SolveBuffer, SparseCholesky, SymmetricMatrix};
 use crate::pipeline::connectivity::Connectivity;
 
@@ -8,62 +7,89 @@ use crate::pipeline::connectivity::Connectivity;
 const FIXED: f64 = 1e5;
 const FREE: f64 = 1e-4;
 
-/// Diffusion of the known part's bend before it goes on: that of a rim is half noise.
-const BEND_SMOOTHING: f64 = 30.0;
+/// Steps of conjugate gradients, and the share of the residual at which they have come far enough.
+const STEPS: usize = 200;
+const ENOUGH: f32 = 1e-4;
 
-/// Draws a shape `[N, 3]` anew where nothing is known of it: it goes on from what is known, bending on as it did there,
-/// ever less, until it closes.
+/// Draws a shape `[N, 3]` anew where nothing is known of it: as a thin plate that goes on from what is known without an
+/// edge, and closes.
 ///
-/// Two harmonic problems on the unknown vertices, with L the combinatorial Laplacian: L q = 0, where q is the known
-/// part's L p, and then L p = q.
+/// Minimises |L p|^2 with L the combinatorial Laplacian and the known vertices held, by conjugate gradients; what would
+/// solve the problem but for its boundary, L^-1 L^-1, is the preconditioner.
 pub fn close_smoothly(connectivity: &Connectivity, p: &mut [Vec3A], unknown: &[bool]) {
     if !unknown.contains(&true) || !unknown.contains(&false) {
         return;
     }
-    let topology = &connectivity.topology;
-    let mut matrix = SymmetricMatrix::diffusion(topology, 1.0);
-    for (diagonal, &unknown) in matrix.diagonal.iter_mut().zip(unknown) {
+    let Some(mut plate) = Plate::new(connectivity, unknown) else { return };
+    let mut residual = plate.bend(p);
+    residual.iter_mut().for_each(|r| *r = -*r);
+    let target = ENOUGH * ENOUGH * dot(&residual, &residual);
+    let mut along = plate.precondition(&residual);
+    let mut size = dot(&residual, &along);
+    for _ in 0..STEPS {
+        if size <= 0.0 || dot(&residual, &residual) <= target {
+            break;
+        }
+        let bent = plate.bend(&along);
+        let step = size / dot(&along, &bent).max(f32::MIN_POSITIVE);
+        add(p, step, &along);
+        add(&mut residual, -step, &bent);
+        let next = plate.precondition(&residual);
+        let grown = dot(&residual, &next);
+        along.iter_mut().zip(next).for_each(|(along, next)| *along = next + *along * (grown / size));
+        size = grown;
+    }
+}
+
+/// The problem on the unknown vertices.
+struct Plate<'a> {
+    connectivity: &'a Connectivity,
+    unknown: &'a [bool],
+    laplacian: SymmetricMatrix,
+    system: SparseCholesky,
+    buffer: SolveBuffer,
+}
+
+impl<'a> Plate<'a> {
+    fn new(connectivity: &'a Connectivity, unknown: &'a [bool]) -> Option<Self> {
+        let topology = &connectivity.topology;
+        let mut laplacian = SymmetricMatrix::diffusion(topology, 1.0);
         // The diffusion's own weight is one.
-        *diagonal += if unknown { FREE } else { FIXED } - 1.0;
+        laplacian.diagonal.iter_mut().for_each(|diagonal| *diagonal -= 1.0);
+        let diagonal = laplacian.diagonal.iter().zip(unknown);
+        let diagonal = diagonal.map(|(d, &unknown)| d + if unknown { FREE } else { FIXED }).collect();
+        let held = SymmetricMatrix { diagonal, edges: laplacian.edges.clone() };
+        let system = SparseCholesky::new(topology, &held, connectivity.dissection()).ok()?;
+        Some(Self { connectivity, unknown, laplacian, system, buffer: SolveBuffer::default() })
     }
-    let Ok(system) = SparseCholesky::new(topology, &matrix, connectivity.dissection()) else { return };
-    let mut buffer = SolveBuffer::default();
-    let bend = smooth_bend(connectivity, p, unknown, &mut buffer);
-    let held = |values: &[Vec3A], free: &dyn Fn(usize) -> Vec3A| -> Vec<Vec3A> {
-        let at = |i: usize| if unknown[i] { free(i) } else { values[i] * FIXED as f32 };
-        (0..values.len()).map(at).collect()
-    };
-    let mut q = held(&bend, &|_| Vec3A::ZERO);
-    system.solve(&mut q, &mut buffer);
-    let mut drawn = held(p, &|i| q[i] + p[i] * FREE as f32);
-    system.solve(&mut drawn, &mut buffer);
-    for (i, drawn) in drawn.into_iter().enumerate().filter(|(i, _)| unknown[*i]) {
-        p[i] = drawn;
+
+    /// Half the gradient of |L x|^2 in the unknown vertices.
+    fn bend(&self, x: &[Vec3A]) -> Vec<Vec3A> {
+        let topology = &self.connectivity.topology;
+        let once = self.laplacian.multiply(topology, x);
+        self.of_unknown(self.laplacian.multiply(topology, &once))
+    }
+
+    fn precondition(&mut self, x: &[Vec3A]) -> Vec<Vec3A> {
+        let mut solved = x.to_vec();
+        self.system.solve(&mut solved, &mut self.buffer);
+        let mut solved = self.of_unknown(solved);
+        self.system.solve(&mut solved, &mut self.buffer);
+        self.of_unknown(solved)
+    }
+
+    fn of_unknown(&self, mut x: Vec<Vec3A>) -> Vec<Vec3A> {
+        x.iter_mut().zip(self.unknown).filter(|(_, unknown)| !**unknown).for_each(|(x, _)| *x = Vec3A::ZERO);
+        x
     }
 }
 
-/// L p `[N, 3]` of the known part, averaged over vertices all of whose neighbours are known.
-fn smooth_bend(
-    connectivity: &Connectivity,
-    p: &[Vec3A],
-    unknown: &[bool],
-    buffer: &mut SolveBuffer,
-) -> Vec<Vec3A> {
-    let topology = &connectivity.topology;
-    let inner = |i: usize| !unknown[i] && topology.neighbours.row(i).iter().all(|&j| !unknown[j as usize]);
-    let mut share: Vec<f32> = (0..p.len()).map(|i| f32::from(u8::from(inner(i)))).collect();
-    let mut bend = laplacian(topology, p);
-    bend.iter_mut().zip(&share).for_each(|(bend, share)| *bend *= *share);
-    let smoother = connectivity.diffusion(BEND_SMOOTHING);
-    smoother.solve(&mut bend, buffer);
-    smoother.solve_scalar(&mut share, buffer);
-    bend.iter().zip(share).map(|(bend, share)| *bend / share.max(1e-3)).collect()
+fn dot(a: &[Vec3A], b: &[Vec3A]) -> f32 {
+    a.iter().zip(b).map(|(a, b)| f64::from(a.dot(*b))).sum::<f64>() as f32
 }
 
-/// L p `[N, 3]`: how far each vertex stands out from its neighbours, times their number.
-fn laplacian(topology: &Topology, p: &[Vec3A]) -> Vec<Vec3A> {
-    let at = |i: usize| topology.neighbours.row(i).iter().map(|&j| p[i] - p[j as usize]).sum();
-    (0..p.len()).map(at).collect()
+fn add(x: &mut [Vec3A], factor: f32, other: &[Vec3A]) {
+    x.iter_mut().zip(other).for_each(|(x, other)| *x += *other * factor);
 }
 
 #[cfg(test)]

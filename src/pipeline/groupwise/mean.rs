@@ -13,8 +13,10 @@ const ROUNDS: usize = 3;
 pub fn mean_shape(members: &[Vec<Vec3A>], weights: &[f64], known: &[Vec<f64>]) -> Vec<Vec3A> {
     let members: Vec<Vec<DVec3>> =
         members.iter().map(|member| member.iter().map(|p| p.as_dvec3()).collect()).collect();
-    let Some(first) = members.first() else { return Vec::new() };
-    let mut mean = first.clone();
+    let share = |k: usize| known[k].iter().sum::<f64>();
+    let most = (0..members.len()).reduce(|best, k| if share(k) > share(best) { k } else { best });
+    let Some(most) = most else { return Vec::new() };
+    let mut mean = members[most].clone();
     for _ in 0..ROUNDS {
         mean = unit(weighted_mean(&aligned(&members, &mean, known), weights, known));
     }
