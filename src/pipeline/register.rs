@@ -9,6 +9,7 @@ use rayon::prelude::*;
 use super::confidence::confidence;
 use super::fit::{SphereLandmark, fit};
 use super::groupwise::{Member, RestShape, SharedMesh, close_smoothly, mean_shape, register_member};
+use super::mask::{MaskError, check_mask};
 use super::observer::{Canceled, Observer, Stage, Watch};
 use super::resample;
 use super::scan_surface::ScanSurface;
@@ -81,6 +82,14 @@ pub enum RegisterError {
         /// Which.
         names: String,
     },
+    /// A mask that is none for its scan.
+    #[error("the mask of scan `{name}` {error}")]
+    Mask {
+        /// The scan.
+        name: String,
+        /// What is wrong with it.
+        error: MaskError,
+    },
     /// Stopped on request.
     #[error(transparent)]
     Canceled(#[from] Canceled),
@@ -109,13 +118,18 @@ pub fn fit_scan(
 /// Registers a collection: fit, resample, register, and rounds of the groupwise stage.
 ///
 /// # Errors
-/// [`RegisterError`] for an empty collection, too few common landmarks, or a request to stop.
+/// [`RegisterError`] for an empty collection, too few common landmarks, a mask that does not fit its scan, or a request
+/// to stop.
 pub fn register(
     subjects: &[Subject],
     settings: &Settings,
     observer: &dyn Observer,
 ) -> Result<Registration, RegisterError> {
     let names = common_landmarks(subjects)?;
+    for Subject { name, mesh, mask, .. } in subjects {
+        let checked = mask.as_ref().map_or(Ok(()), |mask| check_mask(mask, mesh.positions().len()));
+        checked.map_err(|error| RegisterError::Mask { name: name.clone(), error })?;
+    }
     let mut run = Run { settings, observer, names, seconds: BTreeMap::new() };
     let members = run.timed(Stage::Prepare, |run| run.prepare(subjects));
     let fits = run.timed(Stage::Fit, |run| run.fit_all(Stage::Fit, &members, &run.settings.fit, &[]))?;
