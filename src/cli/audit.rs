@@ -32,7 +32,7 @@ impl Audit {
 
 /// The audit of scans that have been read.
 pub fn audit_subjects(subjects: &[Subject]) -> LandmarkAudit {
-    let cases = subjects.iter().map(|Subject { name, mesh, landmarks }| AuditCase {
+    let cases = subjects.iter().map(|Subject { name, mesh, landmarks, .. }| AuditCase {
         name,
         landmarks,
         mesh: Some(mesh),

@@ -99,8 +99,8 @@ pub fn read(collection: &Path) -> anyhow::Result<(Vec<Subject>, Vec<Vec<InputFil
     let collection = Collection::open(collection)?;
     let scans: Result<Vec<Scan>, _> = collection.members().par_iter().map(|member| member.read()).collect();
     let split = |scan: Scan| {
-        let Scan { name, mesh, landmarks, inputs } = scan;
-        (Subject { name, mesh, landmarks }, inputs)
+        let Scan { name, mesh, landmarks, mask, inputs } = scan;
+        (Subject { name, mesh, landmarks, mask }, inputs)
     };
     Ok(scans?.into_iter().map(split).unzip())
 }

@@ -96,9 +96,10 @@ impl Package<'_> {
             .subjects
             .par_iter()
             .zip(&results)
-            .map(|(subject, result)| {
-                let report = ScanReport::of(subject, result, &self.registration.template);
-                let bytes = self.glb(subject, result, &report)?;
+            .zip(&self.registration.confidence)
+            .map(|((subject, result), confidence)| {
+                let report = ScanReport::of(subject, result, confidence, &self.registration.template);
+                let bytes = self.glb(subject, result, &report, confidence)?;
                 write_whole(folder.join(file_of(&subject.name)), &bytes)?;
                 Ok((report, Sha256::of(&bytes)))
             })
@@ -129,12 +130,14 @@ impl Package<'_> {
         subject: &Subject,
         result: &TriangleMesh,
         report: &ScanReport,
+        confidence: &[f32],
     ) -> Result<Vec<u8>, FormatError> {
+        let confidence: Vec<f64> = confidence.iter().copied().map(f64::from).collect();
         let glb = Glb {
             name: &subject.name,
             normals: Some(&vertex_normals(result)),
             texture_coordinates: self.registration.template.texture_coordinates.as_deref(),
-            scalars: vec![("_RESIDUAL", &report.fidelity.residuals)],
+            scalars: vec![("_RESIDUAL", &report.fidelity.residuals), ("_CONFIDENCE", &confidence)],
             extras: self.extras(result),
             ..Glb::new(result)
         };
