@@ -89,7 +89,7 @@ fn holds_to_its_scan(document: &Value) {
     let attributes = document["meshes"][0]["primitives"][0]["attributes"].as_object().unwrap();
     let mut names: Vec<&str> = attributes.keys().map(String::as_str).collect();
     names.sort_unstable();
-    assert_eq!(names, ["NORMAL", "POSITION", "TEXCOORD_0", "_RESIDUAL"]);
+    assert_eq!(names, ["NORMAL", "POSITION", "TEXCOORD_0", "_CONFIDENCE", "_RESIDUAL"]);
     let extras = &document["scenes"][0]["extras"];
     assert_eq!(extras["scheme"], "multipie68");
     assert_eq!(extras["landmarks"].as_array().unwrap().len(), 68);

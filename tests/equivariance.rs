@@ -102,6 +102,7 @@ fn subject(head: &SculptedHead, motion: impl Fn(DVec3) -> DVec3) -> Subject {
         name: head.name.clone(),
         mesh: moved(&head.mesh, &motion),
         landmarks: LandmarkSet { points, ..head.landmarks.clone() },
+        mask: None,
     }
 }
 

@@ -52,6 +52,7 @@ fn registration() {
         name: head.name.clone(),
         mesh: head.mesh.clone(),
         landmarks: head.landmarks.clone(),
+        mask: None,
     };
     let subjects: Vec<Subject> = heads.iter().map(subject).collect();
     let result = register(&subjects, &Settings::preset(Preset::Default, 2562).unwrap(), &()).unwrap();

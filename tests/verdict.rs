@@ -21,11 +21,14 @@ fn settings(vertices: usize) -> Settings {
 
 /// The reports of a registration's results, each beside the others of `subjects`.
 fn reports(subjects: &[Subject], registration: &Registration) -> Vec<ScanReport> {
-    let Registration { template, members, .. } = registration;
+    let Registration { template, members, confidence, .. } = registration;
     let results = members.iter().map(|p| TriangleMesh::new(p.clone(), template.triangles.clone()).unwrap());
     let checks = precheck(subjects);
-    let all = subjects.iter().zip(&checks).zip(results);
-    all.map(|((subject, check), result)| ScanReport::of(subject, check, &result, template)).collect()
+    let all = subjects.iter().zip(&checks).zip(results).zip(confidence);
+    let report = |(((subject, check), result), confidence): (_, &Vec<f32>)| {
+        ScanReport::of(subject, check, &result, confidence, template)
+    };
+    all.map(report).collect()
 }
 
 /// One scan of a collection spoiled, registered from the template and judged among the others.
@@ -42,14 +45,14 @@ fn judged(
     let spoiled = &collection[at..=at];
     let registration = register_to(template, spoiled, settings, &()).unwrap();
     let result = TriangleMesh::new(registration.members[0].clone(), template.triangles.clone()).unwrap();
-    ScanReport::of(&spoiled[0], &check, &result, template)
+    ScanReport::of(&spoiled[0], &check, &result, &registration.confidence[0], template)
 }
 
 fn row(what: &str, report: &ScanReport) {
     let codes: Vec<&str> = report.reasons.iter().map(|reason| reason.code).collect();
     println!("| {what} | {} | {} | {} |", report.name, report.verdict, codes.join(", "));
     let fidelity = &report.fidelity;
-    let (scan, coverage, spacing) = (fidelity.scan, fidelity.coverage, fidelity.spacing);
+    let (scan, overlap, spacing) = (fidelity.scan, fidelity.overlap, fidelity.spacing);
     let most = report.landmarks.values().copied().fold(0.0, f64::max);
     if std::env::var_os("FIGURES").is_some() {
         println!(
@@ -60,11 +63,11 @@ fn row(what: &str, report: &ScanReport) {
             scan.spikes,
             report.precheck.damage,
             report.precheck.largest_part,
-            coverage.scan,
-            coverage.mesh,
-            coverage.mesh_over_scan,
-            fidelity.scan_to_mesh.map_or(f64::NAN, |d| d.p50 / coverage.tolerance),
-            fidelity.mesh_to_scan.map_or(f64::NAN, |d| d.p50 / coverage.tolerance),
+            overlap.scan,
+            overlap.mesh,
+            overlap.mesh_over_scan,
+            fidelity.scan_to_mesh.map_or(f64::NAN, |d| d.p50 / overlap.tolerance),
+            fidelity.mesh_to_scan.map_or(f64::NAN, |d| d.p50 / overlap.tolerance),
             fidelity.normal.unwrap_or(f64::NAN),
             report.landmark_mean / scan.radius,
             most / scan.radius,
@@ -102,7 +105,7 @@ fn sculpted_heads_pass_until_they_are_spoiled() {
     let heads = Sculptor::new(3).with(Heads { triangles: 12_000, ..Heads::default() });
     let subject = |head: onemesh::demo::SculptedHead| {
         let (name, mesh, landmarks) = (head.name, head.mesh, head.landmarks);
-        Subject { name, mesh, landmarks }
+        Subject { name, mesh, landmarks, mask: None }
     };
     let good: Vec<Subject> = heads.collection(3, &[1.0]).into_iter().map(subject).collect();
     let some = ["landmarks mirrored", "one landmark far off", "a sphere for a head", "two heads"];
@@ -124,6 +127,7 @@ fn heads_of_a_morphable_model_pass_until_they_are_spoiled() {
         mesh: read_mesh(folder.join(&name).join("scan.ply")).unwrap(),
         landmarks: read_landmarks(folder.join(&name).join("landmarks.json")).unwrap(),
         name,
+        mask: None,
     };
     let good: Vec<Subject> = names.map(subject).collect();
     check(&good, &settings(2562), &FAULTS.iter().collect::<Vec<_>>());

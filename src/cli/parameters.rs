@@ -65,6 +65,15 @@ impl Parameters {
         if self.density.is_some() {
             settings = settings.without_density();
         }
+        self.assign(settings)
+    }
+
+    /// The parameters that a frozen collection was registered with, but for those that are set by name.
+    pub fn over_frozen(&self, settings: Settings) -> anyhow::Result<Settings> {
+        self.assign(settings)
+    }
+
+    fn assign(&self, mut settings: Settings) -> anyhow::Result<Settings> {
         for assignment in &self.set {
             let (name, value) = assignment
                 .split_once('=')

@@ -32,8 +32,11 @@ pub struct Register {
 impl Register {
     /// Does it.
     pub fn run(self) -> anyhow::Result<()> {
-        let settings = self.parameters.for_registration()?;
-        let template = self.template.read()?;
+        let (template, frozen) = self.template.read()?.unzip();
+        let settings = match frozen.flatten() {
+            Some(settings) => self.parameters.over_frozen(settings)?,
+            None => self.parameters.for_registration()?,
+        };
         let outcome = register_collection(&self.collection, &self.output, template.as_ref(), &settings)?;
         outcome.print(&self.output);
         let failed = outcome.report.count(Verdict::Fail);
@@ -101,8 +104,8 @@ pub fn read(collection: &Path) -> anyhow::Result<(Vec<Subject>, Vec<Vec<InputFil
     let collection = Collection::open(collection)?;
     let scans: Result<Vec<Scan>, _> = collection.members().par_iter().map(|member| member.read()).collect();
     let split = |scan: Scan| {
-        let Scan { name, mesh, landmarks, inputs } = scan;
-        (Subject { name, mesh, landmarks }, inputs)
+        let Scan { name, mesh, landmarks, mask, inputs } = scan;
+        (Subject { name, mesh, landmarks, mask }, inputs)
     };
     Ok(scans?.into_iter().map(split).unzip())
 }

@@ -2,12 +2,12 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use onemesh::formats::{LandmarkFile, MeshFile};
-use onemesh::pipeline::Template;
+use onemesh::pipeline::{FrozenCollection, Settings, Template};
 
 /// A template of the user's.
 #[derive(Debug, clap::Args)]
 pub struct TemplateFiles {
-    /// A mesh of your own, or the `template.glb` of an earlier registration: its triangles in place of a sphere's
+    /// A mesh of your own, or the `template.frozen.glb` of an earlier registration: its triangles in place of a sphere's
     #[arg(long, value_name = "FILE")]
     template: Option<PathBuf>,
     /// The template's landmarks, where they do not lie in the file or beside it under its name
@@ -16,12 +16,18 @@ pub struct TemplateFiles {
 }
 
 impl TemplateFiles {
-    /// Reads it, where one is given.
-    pub fn read(&self) -> anyhow::Result<Option<Template>> {
-        self.template.as_deref().map(|path| self.read_from(path)).transpose()
+    /// Reads it, where one is given, and with a frozen collection its settings.
+    pub fn read(&self) -> anyhow::Result<Option<(Template, Option<Settings>)>> {
+        let Some(path) = &self.template else { return Ok(None) };
+        let shown = || path.display().to_string();
+        let bytes = std::fs::read(path).with_context(shown)?;
+        Ok(Some(match FrozenCollection::parse(&bytes).with_context(shown)? {
+            Some(FrozenCollection { template, settings }) => (template, Some(settings)),
+            None => (self.of_mesh(path)?, None),
+        }))
     }
 
-    fn read_from(&self, path: &Path) -> anyhow::Result<Template> {
+    fn of_mesh(&self, path: &Path) -> anyhow::Result<Template> {
         let file = MeshFile::read(path)?;
         let landmarks = match self.template_landmarks.clone().or_else(|| beside(path)) {
             Some(landmarks) => LandmarkFile::read(landmarks)?,
@@ -32,7 +38,7 @@ impl TemplateFiles {
             ),
         };
         let landmarks = landmarks.on(&file).with_context(|| path.display().to_string())?;
-        Ok(Template::of_mesh(&file.mesh, &landmarks))
+        Ok(Template::of_file(&file, &landmarks))
     }
 }
 

@@ -29,7 +29,7 @@ pub struct Fidelity {
     /// From points of the mesh to the scan.
     pub mesh_to_scan: Option<Distances>,
     /// How much of either surface the other has.
-    pub coverage: Coverage,
+    pub overlap: Overlap,
     /// Mean squared difference of unit normals at those pairs, the mean of the two ways.
     pub normal: Option<f64>,
     /// Share of mesh triangles that face away from the scan's surface at their centre.
@@ -49,7 +49,7 @@ pub struct Fidelity {
 
 /// How much of either surface the other has.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Coverage {
+pub struct Overlap {
     /// The distance up to which surfaces count as one: 1 % of the scan's radius, or three deviations of its noise if
     /// these are more.
     pub tolerance: f64,
@@ -96,7 +96,7 @@ impl Fidelity {
         };
         Self {
             scan: quality,
-            coverage: Coverage {
+            overlap: Overlap {
                 tolerance,
                 scan: within(&onto_mesh.distances),
                 mesh_over_scan: onto_scan.distances.len() as f64 / SAMPLES as f64,
@@ -152,7 +152,7 @@ mod tests {
         }
         assert_eq!((fidelity.flipped, fidelity.sliver), (0.0, 0.0));
         assert_eq!((fidelity.self_intersecting, fidelity.self_intersections), (0.0, 0));
-        assert_eq!((fidelity.coverage.scan, fidelity.coverage.mesh), (0.0, 0.0));
+        assert_eq!((fidelity.overlap.scan, fidelity.overlap.mesh), (0.0, 0.0));
         assert_eq!(fidelity.residuals.len(), 10242);
         assert!(fidelity.residuals.iter().all(|d| (d - 0.5).abs() < 0.02));
     }
@@ -163,10 +163,10 @@ mod tests {
         let upper = |t: &&[u32; 3]| t.iter().all(|&i| whole.positions()[i as usize].y > 0.0);
         let triangles = whole.triangles().iter().filter(upper).copied().collect();
         let half = TriangleMesh::new(whole.positions().to_vec(), triangles).unwrap();
-        let Coverage { tolerance, scan, mesh_over_scan, mesh } = Fidelity::of(&half, &whole).coverage;
+        let Overlap { tolerance, scan, mesh_over_scan, mesh } = Fidelity::of(&half, &whole).overlap;
         assert!((tolerance - 0.1).abs() < 0.01 && scan == 1.0 && mesh == 1.0, "{tolerance} {scan} {mesh}");
         assert!((mesh_over_scan - 0.5).abs() < 0.02, "{mesh_over_scan}");
-        let other_way = Fidelity::of(&whole, &half).coverage;
+        let other_way = Fidelity::of(&whole, &half).overlap;
         assert!((other_way.scan - 0.5).abs() < 0.02 && other_way.mesh == 1.0, "{other_way:?}");
     }
 }

@@ -20,7 +20,7 @@ pub use correspondence::{
     correspondence_figures,
 };
 pub use dense_points::{DensePointsError, dense_points_from_json, dense_points_from_npy};
-pub use fidelity::{Coverage, Distances, Fidelity, NOISE_TOLERANCE, TOLERANCE};
+pub use fidelity::{Distances, Fidelity, NOISE_TOLERANCE, Overlap, TOLERANCE};
 pub use scan_quality::ScanQuality;
 pub use spacing::Spacing;
 pub use surface_figures::{SurfaceFigures, surface_figures};

@@ -24,6 +24,8 @@ pub struct ScanQuality {
     pub noise: f64,
     /// Share of vertices that lie far off that surface: by more than 1 % of the radius and ten times the noise.
     pub spikes: f64,
+    /// Share of edges with one triangle only: a whole surface has few, at its rim.
+    pub rim: f64,
 }
 
 impl ScanQuality {
@@ -41,7 +43,14 @@ impl ScanQuality {
         let noise = median(&offsets) / NOISE_TO_OFFSET;
         let far = (SPIKE[0] * radius).max(SPIKE[1] * noise);
         let spikes = offsets.iter().filter(|&&offset| offset > far).count();
-        Self { radius, edge: median(&lengths), noise, spikes: spikes as f64 / offsets.len().max(1) as f64 }
+        let single = topology.edge_triangles.iter().filter(|[one, other]| one == other).count();
+        Self {
+            radius,
+            edge: median(&lengths),
+            noise,
+            spikes: spikes as f64 / offsets.len().max(1) as f64,
+            rim: single as f64 / lengths.len().max(1) as f64,
+        }
     }
 }
 
@@ -81,7 +90,7 @@ mod tests {
         let smooth = positions.iter().map(|&p| p * 10.0).collect();
         let found = ScanQuality::of(&TriangleMesh::new(smooth, triangles.clone()).unwrap());
         assert!((found.radius - 10.0).abs() < 1e-9 && (found.edge - 0.36).abs() < 0.03, "{found:?}");
-        assert!(found.noise < 0.01 && found.spikes == 0.0, "{found:?}");
+        assert!(found.noise < 0.01 && (found.spikes, found.rim) == (0.0, 0.0), "{found:?}");
         let spiked =
             positions.iter().enumerate().map(|(i, &p)| if i % 100 == 0 { p * 13.0 } else { p * 10.0 });
         let found = ScanQuality::of(&TriangleMesh::new(spiked.collect(), triangles).unwrap());

@@ -1,11 +1,13 @@
 use std::path::Path;
 
+use glam::DVec2;
+
 use super::error::{Fault, FormatError};
 use super::geometry::{FileOrder, Geometry};
 use super::input::{self, InputFile, Siblings};
 use super::mesh_format::MeshFormat;
 use super::polygons::Polygons;
-use super::texture::Texture;
+use super::texture::{ImageOrigin, Texture};
 use super::{gltf, obj, ply, stl, text};
 use crate::mesh::TriangleMesh;
 
@@ -52,6 +54,25 @@ impl MeshFile {
     /// [`FormatError`] without a file; [`FormatError::in_file`] adds one. A glTF whose mesh is in other files is refused.
     pub fn parse(bytes: &[u8], format: MeshFormat) -> Result<Self, FormatError> {
         Ok(Self::parse_beside(bytes, format, &Siblings::none())?)
+    }
+
+    /// Texture coordinates `[N, 2]`, (0, 0) in the picture's upper left corner, if every vertex has one pair or none.
+    pub fn vertex_texture_coordinates(&self) -> Option<Vec<DVec2>> {
+        let texture = self.texture.as_ref()?;
+        let mut of_vertices = vec![None; self.mesh.positions().len()];
+        for (corner, &vertex) in self.polygons.corners().iter().enumerate() {
+            let own = texture.coordinate(corner)?;
+            let slot = &mut of_vertices[vertex as usize];
+            if slot.is_some_and(|other| other != own) {
+                return None;
+            }
+            *slot = Some(own);
+        }
+        let upright = |own: Option<DVec2>| match (own.unwrap_or_default(), texture.origin) {
+            (own, ImageOrigin::UpperLeft) => own,
+            (own, ImageOrigin::LowerLeft) => DVec2::new(own.x, 1.0 - own.y),
+        };
+        Some(of_vertices.into_iter().map(upright).collect())
     }
 
     /// The file at `path` and those it was read from, the first of them `path` itself; pictures are not read.

@@ -80,7 +80,7 @@ impl VertexMatcher {
             hit.map_or(VertexMatch::default(), |hit| VertexMatch {
                 point: hit.point,
                 normal: scan.normal_at(&hit),
-                weight: if scan.on_rim(&hit) { 0.0 } else { 1.0 },
+                weight: scan.weight_at(&hit),
             })
         };
         let queries = self.last.par_iter_mut().enumerate().with_min_len(MIN_QUERIES);
@@ -127,7 +127,7 @@ impl SampleMatcher {
             let hit = surface.closest(sample.point, sample.normal, last, fresh);
             hit.map_or(SampleMatch::default(), |hit| SampleMatch {
                 triangle: hit.triangle,
-                weight: 1.0,
+                weight: sample.weight,
                 weights: hit.weights,
                 point: sample.point,
                 normal: sample.normal,

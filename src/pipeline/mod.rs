@@ -1,10 +1,15 @@
 //! The paper's stages over a collection: fit, resample, register, and what we add to them. Layer 4.
 
 mod comparison;
+mod confidence;
 mod connectivity;
 mod fit;
+mod frozen;
 mod groupwise;
+mod head;
+mod known;
 mod manifest;
+mod mask;
 mod matching;
 mod observer;
 mod package;
@@ -17,14 +22,19 @@ mod scan_surface;
 mod setting_name;
 mod settings;
 mod sphere;
+mod strays;
 mod template;
 mod transfer;
 mod verdict;
 
 pub use comparison::comparison_sheet;
+pub use confidence::confidence;
 pub use connectivity::Connectivity;
 pub use fit::{SphereLandmark, fit};
+pub use frozen::{FrozenCollection, FrozenError};
+pub use head::head;
 pub use manifest::{InputEntry, LandmarkEntry, Manifest, ScanEntry, TemplateEntry};
+pub use mask::MaskError;
 pub use observer::{Canceled, Observer, Progress, Stage, Watch};
 pub use package::{Package, PackageError, spare_inputs, vertex_normals};
 pub use precheck::{Precheck, audit_landmarks, precheck};

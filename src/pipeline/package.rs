@@ -11,6 +11,7 @@ use rayon::prelude::*;
 use serde_json::{Value, json};
 
 use super::comparison::comparison_sheet;
+use super::frozen::{FrozenCollection, FrozenError};
 use super::manifest::{InputEntry, Manifest, ScanEntry, TemplateEntry};
 use super::precheck::Precheck;
 use super::register::{Registration, Subject};
@@ -25,6 +26,7 @@ const RECORD: u32 = 1;
 const MANIFEST: &str = "manifest.json";
 const REPORT: &str = "report.json";
 const SHEET: &str = "sheet.png";
+const TEMPLATE: &str = "template.frozen.glb";
 
 /// A registered collection on its way to disk.
 #[derive(Debug, Clone)]
@@ -73,6 +75,9 @@ pub enum PackageError {
     /// A file cannot be written.
     #[error(transparent)]
     File(#[from] FormatError),
+    /// The template cannot be kept.
+    #[error(transparent)]
+    Frozen(#[from] FrozenError),
     /// The sheet cannot be drawn.
     #[error(transparent)]
     Picture(#[from] PictureError),
@@ -80,7 +85,7 @@ pub enum PackageError {
 
 impl Package<'_> {
     /// Writes everything to `folder`, which is made where it is not there: `NAME.glb` for each scan, in the scan's own
-    /// space and units, `sheet.png`, `report.json`, and last `manifest.json`. Every file is written whole or not at all.
+    /// space and units, `template.frozen.glb`, `sheet.png`, `report.json`, and last `manifest.json`. Every file is written whole or not at all.
     ///
     /// # Errors
     /// [`PackageError`] names the file or the scan.
@@ -95,13 +100,18 @@ impl Package<'_> {
             .par_iter()
             .zip(self.prechecks)
             .zip(&results)
-            .map(|((subject, precheck), result)| {
-                let report = ScanReport::of(subject, precheck, result, &self.registration.template);
-                let bytes = self.glb(subject, result, &report)?;
+            .zip(&self.registration.confidence)
+            .map(|(((subject, precheck), result), confidence)| {
+                let report =
+                    ScanReport::of(subject, precheck, result, confidence, &self.registration.template);
+                let bytes = self.glb(subject, result, &report, confidence)?;
                 write_whole(folder.join(file_of(&subject.name)), &bytes)?;
                 Ok((report, Sha256::of(&bytes)))
             })
             .collect::<Result<Vec<_>, PackageError>>()?;
+        let Registration { template, .. } = self.registration;
+        let frozen = FrozenCollection { template: template.clone(), settings: self.settings.clone() };
+        write_whole(folder.join(TEMPLATE), &frozen.glb_bytes()?)?;
         write_whole(folder.join(SHEET), &comparison_sheet(self.subjects, &results).png_bytes()?)?;
         let (scans, digests): (Vec<_>, Vec<_>) = scans.into_iter().unzip();
         let seconds = self.seconds(start.elapsed().as_secs_f64());
@@ -125,12 +135,14 @@ impl Package<'_> {
         subject: &Subject,
         result: &TriangleMesh,
         report: &ScanReport,
+        confidence: &[f32],
     ) -> Result<Vec<u8>, FormatError> {
+        let confidence: Vec<f64> = confidence.iter().copied().map(f64::from).collect();
         let glb = Glb {
             name: &subject.name,
             normals: Some(&vertex_normals(result)),
             texture_coordinates: self.registration.template.texture_coordinates.as_deref(),
-            scalars: vec![("_RESIDUAL", &report.fidelity.residuals)],
+            scalars: vec![("_RESIDUAL", &report.fidelity.residuals), ("_CONFIDENCE", &confidence)],
             extras: self.extras(result),
             ..Glb::new(result)
         };
@@ -186,7 +198,7 @@ pub fn spare_inputs(
     inputs: &[Vec<InputFile>],
 ) -> Result<(), PackageError> {
     let outputs = subjects.iter().map(|subject| file_of(&subject.name));
-    let outputs = outputs.chain([MANIFEST, REPORT, SHEET].map(str::to_owned));
+    let outputs = outputs.chain([MANIFEST, REPORT, SHEET, TEMPLATE].map(str::to_owned));
     let outputs: Vec<PathBuf> = outputs.filter_map(|name| fs::canonicalize(folder.join(name)).ok()).collect();
     let is_output = |input: &&InputFile| fs::canonicalize(&input.path).is_ok_and(|at| outputs.contains(&at));
     match inputs.iter().flatten().find(is_output) {

@@ -86,7 +86,7 @@ mod tests {
         let heads = Sculptor::new(7).with(small).collection(2, &[1.0]);
         let subject = |at: usize| {
             let (name, mesh) = (heads[at].name.clone(), heads[at].mesh.clone());
-            Subject { name, mesh, landmarks: heads[at].landmarks.clone() }
+            Subject { name, mesh, landmarks: heads[at].landmarks.clone(), mask: None }
         };
         let mut subjects = [subject(0), subject(1)];
         subjects[1].landmarks.points.swap(8, 27);

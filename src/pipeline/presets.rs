@@ -25,8 +25,9 @@ impl Settings {
                 fit: paper(level),
                 resample,
                 register: paper(level),
+                from_head: false,
                 groupwise: GroupwiseSettings { rounds: 0, ..groupwise() },
-                transfer: transfer(),
+                transfer: groupwise(),
             },
             Preset::Default => Self {
                 preset,
@@ -34,8 +35,9 @@ impl Settings {
                 fit: coarse_to_fine(level.min(4), 120),
                 resample,
                 register: coarse_to_fine(level.min(4), 150),
+                from_head: true,
                 groupwise: groupwise(),
-                transfer: transfer(),
+                transfer: groupwise(),
             },
         })
     }
@@ -118,16 +120,6 @@ fn level(level: u32, iterations: usize) -> LevelSettings {
     }
 }
 
-/// A given template has the shape of what it is laid on: less has to be found, and folds are worse than distance.
-fn transfer() -> GroupwiseSettings {
-    GroupwiseSettings {
-        stiffness: [1000.0, 0.05],
-        smoothing: [1000.0, 1.0],
-        normal_search: [0.05, 0.02],
-        ..groupwise()
-    }
-}
-
 fn groupwise() -> GroupwiseSettings {
     GroupwiseSettings {
         rounds: 2,
@@ -136,10 +128,10 @@ fn groupwise() -> GroupwiseSettings {
         most_need: 10.0,
         phases: 12,
         iterations: 5,
-        stiffness: [1000.0, 0.02],
-        smoothing: [3000.0, 1.0],
+        stiffness: [1000.0, 0.05],
+        smoothing: [1000.0, 1.0],
         landmark_weight: 60.0,
-        normal_search: [0.1, 0.02],
+        normal_search: [0.05, 0.02],
         reach: [0.3, 0.03],
         least_cosine: 0.0,
         samples: 20_000,

@@ -6,21 +6,29 @@ use std::time::Instant;
 use glam::{DVec3, Vec3A};
 use rayon::prelude::*;
 
+use super::confidence::confidence;
 use super::fit::{SphereLandmark, fit};
-use super::groupwise::{Member, RestShape, SharedMesh, mean_shape, register_member};
+use super::groupwise::{Member, RestShape, SharedMesh, close_smoothly, mean_shape, register_member};
+use super::head::{self, head};
+use super::known::{known, unknown};
+use super::mask::{MaskError, check_mask};
 use super::observer::{Canceled, Observer, Stage, Watch};
 use super::resample;
 use super::scan_surface::ScanSurface;
 use super::settings::{FitSettings, Settings};
 use super::sphere::Sphere;
 use super::template::Template;
+use super::transfer::register_to;
 use crate::energy::LandmarkPull;
-use crate::mesh::{Icosphere, LandmarkSet, SurfacePoint, TriangleMesh};
+use crate::mesh::{Icosphere, LandmarkSet, SurfacePoint, TriangleMesh, interpolate};
 use crate::numeric::Similarity;
 use crate::spatial::SurfaceIndex;
 
 /// Samples of a scan that fits draw from.
 pub(super) const SAMPLES: usize = 120_000;
+
+/// The finest level of the head that comes with the program.
+const HEAD_LEVEL: u32 = 5;
 
 /// Samples a registration is judged by when the mean is taken.
 const JUDGED: usize = 10_000;
@@ -34,6 +42,8 @@ pub struct Subject {
     pub mesh: TriangleMesh,
     /// Its landmarks, in the same space.
     pub landmarks: LandmarkSet,
+    /// How much each vertex counts as data `[N]`, 0 to 1; without it all do.
+    pub mask: Option<Vec<f32>>,
 }
 
 /// A registered collection.
@@ -43,6 +53,8 @@ pub struct Registration {
     pub template: Template,
     /// Vertex positions `[N, 3]` of each member, in its own space, in the order of the subjects.
     pub members: Vec<Vec<DVec3>>,
+    /// How far each vertex of each member is known from its scan's data `[M][N]`, from 0 to 1; see [`confidence`].
+    pub confidence: Vec<Vec<f32>>,
     /// Wall-clock seconds of each stage.
     pub seconds: BTreeMap<Stage, f64>,
 }
@@ -75,6 +87,14 @@ pub enum RegisterError {
         /// How many.
         found: usize,
     },
+    /// A mask that is none for its scan.
+    #[error("the mask of scan `{name}` {error}")]
+    Mask {
+        /// The scan.
+        name: String,
+        /// What is wrong with it.
+        error: MaskError,
+    },
     /// Stopped on request.
     #[error(transparent)]
     Canceled(#[from] Canceled),
@@ -103,23 +123,25 @@ pub fn fit_scan(
 /// Registers a collection: fit, resample, register, and rounds of the groupwise stage.
 ///
 /// # Errors
-/// [`RegisterError`] for an empty collection, too few common landmarks, or a request to stop.
+/// [`RegisterError`] for an empty collection, too few common landmarks, a mask that does not fit its scan, or a request
+/// to stop.
 pub fn register(
     subjects: &[Subject],
     settings: &Settings,
     observer: &dyn Observer,
 ) -> Result<Registration, RegisterError> {
     let names = common_landmarks(subjects)?;
+    check_masks(subjects)?;
     let mut run = Run { settings, observer, names, seconds: BTreeMap::new() };
+    if subjects.len() == 1 && run.starts_from_head(subjects) && settings.vertices == head().positions.len() {
+        return register_to(head(), subjects, settings, observer);
+    }
     let members = run.timed(Stage::Prepare, |run| run.prepare(subjects));
-    let fits = run.timed(Stage::Fit, |run| run.fit_all(Stage::Fit, &members, &run.settings.fit, &[]))?;
-    let on_sphere = run.timed(Stage::Resample, |run| run.resample(&members, &fits));
-    let shapes = run.timed(Stage::Register, |run| {
-        run.fit_all(Stage::Register, &members, &run.settings.register, &on_sphere)
-    })?;
-    let sphere = Sphere::of_level(last_level(&settings.register));
-    let points = sphere.surface_points(on_sphere.iter().copied());
-    let mut shared = SharedMesh { sphere, points, shapes, mean: Vec::new() };
+    let mut shared = if run.starts_from_head(subjects) {
+        run.timed(Stage::Prepare, |run| run.lay_head(&members))
+    } else {
+        run.deform_sphere(&members)?
+    };
     if settings.groupwise.rounds > 0 {
         shared = run.timed(Stage::Groupwise, |run| run.groupwise(&members, shared))?;
     }
@@ -134,8 +156,20 @@ pub fn register(
             scheme(subjects),
         ),
         members: members.iter().zip(&shapes).map(back).collect(),
+        confidence: (members.iter().zip(&shapes))
+            .map(|(member, shape)| confidence(&member.scan, &sphere.connectivity.topology, shape))
+            .collect(),
         seconds: run.seconds,
     })
+}
+
+/// Whether every mask is one of its scan.
+pub(super) fn check_masks(subjects: &[Subject]) -> Result<(), RegisterError> {
+    for Subject { name, mesh, mask, .. } in subjects {
+        let checked = mask.as_ref().map_or(Ok(()), |mask| check_mask(mask, mesh.positions().len()));
+        checked.map_err(|error| RegisterError::Mask { name: name.clone(), error })?;
+    }
+    Ok(())
 }
 
 /// The scheme of the landmarks, where a scan names one.
@@ -182,6 +216,47 @@ impl Run<'_> {
         result
     }
 
+    fn starts_from_head(&self, subjects: &[Subject]) -> bool {
+        let settings = self.settings;
+        settings.from_head
+            && settings.groupwise.rounds > 0
+            && last_level(&settings.register) <= HEAD_LEVEL
+            && head::has_landmarks(&self.names, scheme(subjects))
+    }
+
+    /// The head that comes with the program, laid on every member by the landmarks.
+    fn lay_head(&self, members: &[Prepared]) -> SharedMesh {
+        let sphere = Sphere::of_level(last_level(&self.settings.register));
+        let points = sphere.surface_points(head::directions(&self.names));
+        let head = head::positions(sphere.level);
+        let on_head: Vec<DVec3> = points
+            .iter()
+            .map(|at| {
+                let corners = sphere.connectivity.topology.triangles[at.triangle.0 as usize];
+                interpolate(&head, corners, at.weights.map(|w| w as f32)).as_dvec3()
+            })
+            .collect();
+        let equal = vec![1.0; on_head.len()];
+        let lay = |member: &Prepared| {
+            let targets: Vec<DVec3> = member.landmarks.iter().map(|p| p.as_dvec3()).collect();
+            let similarity = Similarity::between(&on_head, &targets, &equal);
+            head.iter().map(|p| similarity.apply(p.as_dvec3()).as_vec3a()).collect()
+        };
+        SharedMesh { shapes: members.iter().map(lay).collect(), sphere, points, mean: Vec::new() }
+    }
+
+    /// The paper's stages: fit, resample, register.
+    fn deform_sphere(&mut self, members: &[Prepared]) -> Result<SharedMesh, Canceled> {
+        let fits = self.timed(Stage::Fit, |run| run.fit_all(Stage::Fit, members, &run.settings.fit, &[]))?;
+        let on_sphere = self.timed(Stage::Resample, |run| run.resample(members, &fits));
+        let shapes = self.timed(Stage::Register, |run| {
+            run.fit_all(Stage::Register, members, &run.settings.register, &on_sphere)
+        })?;
+        let sphere = Sphere::of_level(last_level(&self.settings.register));
+        let points = sphere.surface_points(on_sphere);
+        Ok(SharedMesh { sphere, points, shapes, mean: Vec::new() })
+    }
+
     fn prepare<'s>(&self, subjects: &'s [Subject]) -> Vec<Prepared<'s>> {
         let landmarks = |subject: &Subject| -> Vec<DVec3> {
             self.names.iter().filter_map(|name| subject.landmarks.get(name)).collect()
@@ -191,7 +266,7 @@ impl Run<'_> {
         let prepare = |subject: &'s Subject| {
             let own = landmarks(subject);
             let rotation = Similarity::between(&own, &first, &equal).rotation;
-            let scan = ScanSurface::turned(&subject.mesh, rotation, SAMPLES);
+            let scan = ScanSurface::weighted(&subject.mesh, subject.mask.as_deref(), rotation, SAMPLES);
             let landmarks = own.iter().map(|&p| scan.to_unit(p)).collect();
             Prepared { name: &subject.name, scan, landmarks }
         };
@@ -248,13 +323,16 @@ impl Run<'_> {
             if round + 1 == settings.rounds {
                 shared.refine_to(Icosphere::level_of(self.settings.vertices).unwrap_or(0));
             }
-            shared.mean = mean_shape(&shared.shapes, &trust(&shared.sphere, members, &shared.shapes));
+            let scans: Vec<&ScanSurface> = members.iter().map(|member| &member.scan).collect();
+            let known = known(&shared.sphere.connectivity, &scans, &shared.shapes);
+            let trust = trust(&shared.sphere, members, &shared.shapes);
+            shared.mean = mean_shape(&shared.shapes, &trust, &known);
+            close_smoothly(&shared.sphere.connectivity, &mut shared.mean, &unknown(&known));
             if round > 0 {
-                let scans: Vec<&ScanSurface> = members.iter().map(|member| &member.scan).collect();
                 shared.redistribute(&scans, settings);
             }
             let rest = RestShape::new(shared.sphere.connectivity.clone(), shared.mean.clone());
-            let one = |(member, shape): (&Prepared, &Vec<Vec3A>)| {
+            let one = |((member, shape), known): ((&Prepared, &Vec<Vec3A>), &Vec<f64>)| {
                 let watch = Watch {
                     observer: self.observer,
                     stage: Stage::Groupwise,
@@ -262,11 +340,12 @@ impl Run<'_> {
                     iterations: per_round * settings.rounds,
                 };
                 let pulls = pulls(&shared.points, &member.landmarks);
-                let start = moved_onto(&rest.positions, shape);
+                let start = moved_onto(&rest.positions, shape, known);
                 let member = Member { scan: &member.scan, landmarks: &pulls, start };
                 register_member(&rest, member, settings, &watch, round * per_round)
             };
-            shared.shapes = members.par_iter().zip(&shared.shapes).map(one).collect::<Result<_, _>>()?;
+            shared.shapes =
+                members.par_iter().zip(&shared.shapes).zip(&known).map(one).collect::<Result<_, _>>()?;
         }
         Ok(shared)
     }
@@ -276,11 +355,11 @@ fn pulls(points: &[SurfacePoint], targets: &[Vec3A]) -> Vec<LandmarkPull> {
     points.iter().zip(targets).map(|(point, &target)| LandmarkPull::new(point, target)).collect()
 }
 
-/// A shape moved onto another of the same vertices by a similarity.
-pub(super) fn moved_onto(shape: &[Vec3A], other: &[Vec3A]) -> Vec<Vec3A> {
+/// A shape moved onto another of the same vertices by a similarity, with a weight for each vertex.
+pub(super) fn moved_onto(shape: &[Vec3A], other: &[Vec3A], weights: &[f64]) -> Vec<Vec3A> {
     let from: Vec<DVec3> = shape.iter().map(|p| p.as_dvec3()).collect();
     let to: Vec<DVec3> = other.iter().map(|p| p.as_dvec3()).collect();
-    let similarity = Similarity::between(&from, &to, &vec![1.0; from.len()]);
+    let similarity = Similarity::between(&from, &to, weights);
     from.iter().map(|p| similarity.apply(*p).as_vec3a()).collect()
 }
 
@@ -289,9 +368,13 @@ pub(super) fn moved_onto(shape: &[Vec3A], other: &[Vec3A]) -> Vec<Vec3A> {
 fn trust(sphere: &Sphere, members: &[Prepared], shapes: &[Vec<Vec3A>]) -> Vec<f64> {
     let one = |(member, shape): (&Prepared, &Vec<Vec3A>)| {
         let index = SurfaceIndex::new(shape, &sphere.connectivity.topology.triangles);
-        let sum: f64 =
-            (0..JUDGED).map(|k| f64::from(index.closest(member.scan.sample(k).point).distance_squared)).sum();
-        1.0 / (sum / JUDGED as f64 + 1e-6)
+        let (mut sum, mut count) = (0.0, 0.0);
+        for sample in (0..JUDGED).map(|k| member.scan.sample(k)).filter(|sample| sample.weight > 0.0) {
+            let weight = f64::from(sample.weight);
+            sum += weight * f64::from(index.closest(sample.point).distance_squared);
+            count += weight;
+        }
+        1.0 / (sum / f64::max(count, 1.0) + 1e-6)
     };
     members.par_iter().zip(shapes).map(one).collect()
 }

@@ -37,6 +37,8 @@ pub struct ScanReport {
     /// Distances, normals and the state of the triangles.
     #[serde(flatten)]
     pub fidelity: Fidelity,
+    /// Share of the result's area that the scan's data says: where the vertices' confidence is above a half.
+    pub coverage: f64,
     /// Mean distance of the landmarks.
     pub landmark_mean: f64,
     /// Distance of each of the template's landmarks from the scan's.
@@ -44,8 +46,14 @@ pub struct ScanReport {
 }
 
 impl ScanReport {
-    /// Holds a result against its scan, and judges it.
-    pub fn of(subject: &Subject, precheck: &Precheck, result: &TriangleMesh, template: &Template) -> Self {
+    /// Holds a result against its scan, and judges it; `confidence` `[N]` is its vertices'.
+    pub fn of(
+        subject: &Subject,
+        precheck: &Precheck,
+        result: &TriangleMesh,
+        confidence: &[f32],
+        template: &Template,
+    ) -> Self {
         let residual = |(name, at): (&String, &SurfacePoint)| {
             let target = subject.landmarks.get(name)?;
             Some((name.clone(), position(result, at).distance(target)))
@@ -57,6 +65,7 @@ impl ScanReport {
             reasons: Vec::new(),
             precheck: precheck.clone(),
             fidelity: Fidelity::of(&subject.mesh, result),
+            coverage: coverage(result, confidence),
             landmark_mean: landmarks.values().sum::<f64>() / landmarks.len().max(1) as f64,
             landmarks,
         };
@@ -71,6 +80,18 @@ impl Report {
     pub fn count(&self, verdict: Verdict) -> usize {
         self.scans.iter().filter(|scan| scan.verdict == verdict).count()
     }
+}
+
+/// The share of a mesh's area around vertices of a confidence above a half.
+fn coverage(mesh: &TriangleMesh, confidence: &[f32]) -> f64 {
+    let (mut known, mut all) = (0.0, 0.0);
+    for corners in mesh.triangles() {
+        let [a, b, c] = corners.map(|i| mesh.positions()[i as usize]);
+        let area = (b - a).cross(c - a).length();
+        all += area;
+        known += area * corners.iter().filter(|&&i| confidence[i as usize] > 0.5).count() as f64 / 3.0;
+    }
+    if all > 0.0 { known / all } else { 0.0 }
 }
 
 /// Where a point of the shared triangles lies on a result.

@@ -1,6 +1,7 @@
 use glam::{DMat3, DVec3, Vec3A};
 use rayon::prelude::*;
 
+use super::strays::without_strays;
 use crate::mesh::{Normals, Rim, Topology, TriangleMesh, interpolate};
 use crate::numeric::Random;
 use crate::spatial::{Hit, SurfaceIndex, SurfaceWalk};
@@ -14,6 +15,8 @@ pub struct SurfaceSample {
     pub normal: Vec3A,
     /// How much that normal turns over a unit of length.
     pub curvature: f32,
+    /// The scan's weight there.
+    pub weight: f32,
 }
 
 /// A scan made ready to be fitted: in unit space (its vertices' mean at the origin, the farthest at distance one, and
@@ -33,9 +36,13 @@ pub struct ScanSurface {
     pub walk: SurfaceWalk,
     /// Evenly spread samples in random order, so that any stretch of them covers the surface.
     pub samples: Vec<SurfaceSample>,
+    /// Whether it is a patch, as a face without the back of its head, and not a closed surface but for holes.
+    pub open: bool,
     /// Unit normals per vertex, interpolated by [`ScanSurface::normal_at`].
     normals: Vec<Vec3A>,
     rim: Rim,
+    /// How much each vertex counts as data, 0 to 1; `None` where all count alike.
+    weights: Option<Vec<f32>>,
 }
 
 impl ScanSurface {
@@ -46,18 +53,38 @@ impl ScanSurface {
 
     /// Prepares a scan and turns it.
     pub fn turned(mesh: &TriangleMesh, rotation: DMat3, samples: usize) -> Self {
-        let centre = mesh.centroid();
-        let radius = mesh.radius_about(centre);
+        Self::weighted(mesh, None, rotation, samples)
+    }
+
+    /// Prepares a scan whose vertices count as data as much as `weights` `[N]` say, 0 to 1, and turns it. Small pieces
+    /// that lie away from it are left out.
+    pub fn weighted(mesh: &TriangleMesh, weights: Option<&[f32]>, rotation: DMat3, samples: usize) -> Self {
+        let weights = weights.filter(|weights| weights.iter().any(|w| *w != 1.0)).map(<[f32]>::to_vec);
+        match without_strays(mesh) {
+            Ok(Some((rest, vertices))) => {
+                let kept = |weights: Vec<f32>| vertices.iter().map(|&i| weights[i as usize]).collect();
+                Self::of(&rest, weights.map(kept), rotation, samples)
+            }
+            _ => Self::of(mesh, weights, rotation, samples),
+        }
+    }
+
+    fn of(mesh: &TriangleMesh, weights: Option<Vec<f32>>, rotation: DMat3, samples: usize) -> Self {
+        let (centre, radius) = frame(mesh, weights.as_deref());
         let positions: Vec<Vec3A> =
             mesh.positions().iter().map(|p| (rotation * (*p - centre) / radius).as_vec3a()).collect();
-        let (index, (topology, normals, samples)) = rayon::join(
+        let (index, (topology, normals, samples, open)) = rayon::join(
             || SurfaceIndex::new(&positions, mesh.triangles()),
             || {
                 let topology = Topology::of(mesh);
                 let normals = Normals::new(&topology, &positions);
                 let curvatures = curvatures(&topology, &positions, &normals.vertices);
-                let samples = sample(mesh.triangles(), &positions, &normals, &curvatures, samples);
-                (topology, normals, samples)
+                let open = is_open(mesh.triangles(), &normals.area_vectors, weights.as_deref());
+                let weights =
+                    if open { Some(off_the_rim(&topology, weights.as_deref())) } else { weights.clone() };
+                let surface = Sampled { positions: &positions, normals: &normals, curvatures: &curvatures };
+                let samples = surface.samples(mesh.triangles(), weights.as_deref(), samples);
+                (topology, normals, samples, open)
             },
         );
         Self {
@@ -68,8 +95,10 @@ impl ScanSurface {
             walk: SurfaceWalk::new(&topology),
             positions,
             samples,
+            open,
             normals: normals.vertices,
             rim: Rim::of(&topology),
+            weights,
         }
     }
 
@@ -94,10 +123,52 @@ impl ScanSurface {
         interpolate(&self.normals, corners, hit.weights).normalize_or_zero()
     }
 
-    /// Whether a point of the scan lies on its rim: there the data ends.
-    pub fn on_rim(&self, hit: &Hit) -> bool {
+    /// How much a point of the scan counts as data, 0 to 1; nothing on its rim, where the data ends.
+    pub fn weight_at(&self, hit: &Hit) -> f32 {
+        if self.on_rim(hit) {
+            return 0.0;
+        }
+        let corners = self.index.triangles()[hit.triangle as usize];
+        self.weights.as_ref().map_or(1.0, |weights| interpolate(weights, corners, hit.weights))
+    }
+
+    /// Whether it says what is on every side, so that whatever surrounds it can be held against it.
+    pub fn whole(&self) -> bool {
+        !self.open && self.weights.is_none()
+    }
+
+    fn on_rim(&self, hit: &Hit) -> bool {
         self.rim.contains(hit.triangle, hit.weights)
     }
+}
+
+/// The largest opening of a closed surface, seen as its area's share of the surface's: a head's neck is 0.12, what is
+/// open behind a face 0.45 and more.
+const LARGEST_OPENING: f32 = 0.2;
+
+/// The area vectors of a closed surface add up to zero, those of an open one to its opening's.
+fn is_open(triangles: &[[u32; 3]], area_vectors: &[Vec3A], weights: Option<&[f32]>) -> bool {
+    let weight = |t: usize| {
+        weights.map_or(1.0, |weights| triangles[t].iter().map(|&i| weights[i as usize]).sum::<f32>() / 3.0)
+    };
+    let weighed = || area_vectors.iter().enumerate().map(|(t, area)| *area * weight(t));
+    let area: f32 = weighed().map(|e| e.length()).sum();
+    weighed().sum::<Vec3A>().length() > LARGEST_OPENING * area
+}
+
+/// The weights with which a patch's samples pull: its rim is cut rather than seen, and frayed.
+fn off_the_rim(topology: &Topology, weights: Option<&[f32]>) -> Vec<f32> {
+    let weight = |i: usize| weights.map_or(1.0, |weights| weights[i]);
+    topology.on_rim.iter().enumerate().map(|(i, &on_rim)| if on_rim { 0.0 } else { weight(i) }).collect()
+}
+
+/// The mean and the largest distance from it of the vertices that count as data.
+fn frame(mesh: &TriangleMesh, weights: Option<&[f32]>) -> (DVec3, f64) {
+    let counts = |i: usize| weights.is_none_or(|weights| weights[i] > 0.0);
+    let data = || mesh.positions().iter().enumerate().filter(|(i, _)| counts(*i)).map(|(_, p)| *p);
+    let centre = data().sum::<DVec3>() / data().count().max(1) as f64;
+    let radius = data().map(|p| p.distance_squared(centre)).fold(0.0, f64::max).sqrt();
+    if radius > 0.0 { (centre, radius) } else { (mesh.centroid(), mesh.radius_about(mesh.centroid())) }
 }
 
 /// Rounds of averaging the normals before their turning is taken for the shape's and not the noise's.
@@ -123,36 +194,45 @@ fn curvatures(topology: &Topology, positions: &[Vec3A], normals: &[Vec3A]) -> Ve
     (0..positions.len()).into_par_iter().with_min_len(1024).map(turn).collect()
 }
 
-/// Samples spread evenly by area: one in each of `count` equal stretches of the triangles laid end to end.
-fn sample(
-    triangles: &[[u32; 3]],
-    positions: &[Vec3A],
-    normals: &Normals,
-    curvatures: &[f32],
-    count: usize,
-) -> Vec<SurfaceSample> {
-    let mut random = Random::new(1);
-    let areas = normals.area_vectors.iter().map(|e| f64::from(e.length()));
-    let total: f64 = areas.clone().sum();
-    let mut samples = Vec::with_capacity(count);
-    let (mut passed, mut next) = (0.0, random.unit());
-    for (t, area) in areas.enumerate() {
-        passed += area / total * count as f64;
-        while next < passed && samples.len() < count {
-            let (root, along) = (random.unit().sqrt(), random.unit());
-            let weights = [1.0 - root, root * (1.0 - along), root * along].map(|w| w as f32);
-            let corners = triangles[t];
-            let at = |values: &[Vec3A]| interpolate(values, corners, weights);
-            samples.push(SurfaceSample {
-                point: at(positions),
-                normal: at(&normals.vertices).normalize_or_zero(),
-                curvature: corners.iter().zip(weights).map(|(&i, w)| curvatures[i as usize] * w).sum(),
-            });
-            next = samples.len() as f64 + random.unit();
+/// What samples are drawn from.
+struct Sampled<'a> {
+    positions: &'a [Vec3A],
+    normals: &'a Normals,
+    curvatures: &'a [f32],
+}
+
+impl Sampled<'_> {
+    /// Samples spread evenly by area: one in each of `count` equal stretches of the triangles laid end to end.
+    fn samples(
+        &self,
+        triangles: &[[u32; 3]],
+        vertex_weights: Option<&[f32]>,
+        count: usize,
+    ) -> Vec<SurfaceSample> {
+        let mut random = Random::new(1);
+        let areas = self.normals.area_vectors.iter().map(|e| f64::from(e.length()));
+        let total: f64 = areas.clone().sum();
+        let mut samples = Vec::with_capacity(count);
+        let (mut passed, mut next) = (0.0, random.unit());
+        for (t, area) in areas.enumerate() {
+            passed += area / total * count as f64;
+            while next < passed && samples.len() < count {
+                let (root, along) = (random.unit().sqrt(), random.unit());
+                let weights = [1.0 - root, root * (1.0 - along), root * along].map(|w| w as f32);
+                let corners = triangles[t];
+                let at = |values: &[Vec3A]| interpolate(values, corners, weights);
+                samples.push(SurfaceSample {
+                    point: at(self.positions),
+                    normal: at(&self.normals.vertices).normalize_or_zero(),
+                    curvature: interpolate(self.curvatures, corners, weights),
+                    weight: vertex_weights.map_or(1.0, |values| interpolate(values, corners, weights)),
+                });
+                next = samples.len() as f64 + random.unit();
+            }
         }
+        for i in (1..samples.len()).rev() {
+            samples.swap(i, random.below(i + 1));
+        }
+        samples
     }
-    for i in (1..samples.len()).rev() {
-        samples.swap(i, random.below(i + 1));
-    }
-    samples
 }

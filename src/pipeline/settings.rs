@@ -28,6 +28,10 @@ pub struct Settings {
     pub resample: ResampleSettings,
     /// Stage 3, with landmarks.
     pub register: FitSettings,
+    /// Where the landmarks are those of the head that comes with the program, the groupwise stage starts from it and the
+    /// sphere is left out; a scan alone is registered to it. It has vertices for `vertices` up to 10242.
+    #[serde(default)]
+    pub from_head: bool,
     /// The groupwise stage; zero rounds leave it out.
     pub groupwise: GroupwiseSettings,
     /// Registration from a given template. After each of its rounds but the last the mean takes the template's place,

@@ -3,8 +3,8 @@ use std::collections::BTreeMap;
 use glam::{DVec2, DVec3, Vec3A};
 
 use super::sphere::Sphere;
-use crate::formats::{Region, Scheme};
-use crate::mesh::{LandmarkSet, SurfacePoint, TriangleId, TriangleMesh, sphere_layout};
+use crate::formats::{MeshFile, Region, Scheme};
+use crate::mesh::{LandmarkSet, SurfacePoint, TriangleId, sphere_layout};
 use crate::spatial::SurfaceIndex;
 
 /// What registered scans share: a shape's triangles, and where the landmarks lie on them.
@@ -26,7 +26,8 @@ pub struct Template {
 
 impl Template {
     /// A template of a mesh with landmarks in its space: each is taken to its closest point of the mesh.
-    pub fn of_mesh(mesh: &TriangleMesh, landmarks: &LandmarkSet) -> Self {
+    pub fn of_file(file: &MeshFile, landmarks: &LandmarkSet) -> Self {
+        let mesh = &file.mesh;
         // Nearest points are found in single precision, so about the mesh's own centre and at its own scale.
         let centre = mesh.centroid();
         let radius = mesh.radius_about(centre);
@@ -43,7 +44,7 @@ impl Template {
             triangles: mesh.triangles().to_vec(),
             landmarks: landmarks.present().map(place).collect(),
             scheme: landmarks.scheme.clone(),
-            texture_coordinates: None,
+            texture_coordinates: file.vertex_texture_coordinates(),
             frozen: false,
         }
     }

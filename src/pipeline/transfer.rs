@@ -7,10 +7,14 @@ use std::time::Instant;
 use glam::{DVec3, Vec3A};
 use rayon::prelude::*;
 
+use super::confidence::confidence;
 use super::connectivity::Connectivity;
 use super::groupwise::{Member, RestShape, mean_shape, register_member};
+use super::known::known;
 use super::observer::{Observer, Stage, Watch};
-use super::register::{LEAST_LANDMARKS, RegisterError, Registration, SAMPLES, Subject, moved_onto};
+use super::register::{
+    LEAST_LANDMARKS, RegisterError, Registration, SAMPLES, Subject, check_masks, moved_onto,
+};
 use super::scan_surface::ScanSurface;
 use super::settings::Settings;
 use super::template::Template;
@@ -35,11 +39,13 @@ pub fn register_to(
     if subjects.is_empty() {
         return Err(RegisterError::Empty);
     }
+    check_masks(subjects)?;
     let start = Instant::now();
     let rest: Vec<Vec3A> = template.positions.iter().map(|p| p.as_vec3a()).collect();
     let connectivity = Arc::new(Connectivity::new(&rest, &template.triangles));
     let members: Vec<Laid> =
         subjects.par_iter().map(|subject| Laid::of(template, subject)).collect::<Result<_, _>>()?;
+    let scans: Vec<&ScanSurface> = members.iter().map(|member| &member.scan).collect();
     let settings = &settings.transfer;
     let rounds = if template.frozen || subjects.len() == 1 { 1 } else { settings.rounds.max(1) };
     let per_round = settings.phases * settings.iterations;
@@ -47,8 +53,10 @@ pub fn register_to(
     let mut shapes: Vec<Vec<Vec3A>> = members.iter().map(|member| member.start.clone()).collect();
     for round in 0..rounds {
         if round > 0 {
-            let mean = mean_shape(&shapes, &vec![1.0; shapes.len()]);
-            shapes = shapes.iter().map(|shape| moved_onto(&mean, shape)).collect();
+            let known = known(&connectivity, &scans, &shapes);
+            let mean = mean_shape(&shapes, &vec![1.0; shapes.len()], &known);
+            shapes =
+                shapes.iter().zip(&known).map(|(shape, known)| moved_onto(&mean, shape, known)).collect();
             template.positions = mean.iter().map(|p| p.as_dvec3()).collect();
         }
         let one = |(member, start): (&Laid, Vec<Vec3A>)| {
@@ -60,10 +68,13 @@ pub fn register_to(
         };
         shapes = members.par_iter().zip(shapes).map(one).collect::<Result<_, _>>()?;
     }
+    let confidence = (scans.par_iter().zip(&shapes))
+        .map(|(scan, shape)| confidence(scan, &connectivity.topology, shape))
+        .collect();
     let back = |(member, shape): (&Laid, Vec<Vec3A>)| shape.iter().map(|p| member.scan.to_scan(*p)).collect();
     let members = members.iter().zip(shapes).map(back).collect();
     let seconds = BTreeMap::from([(Stage::Register, start.elapsed().as_secs_f64())]);
-    Ok(Registration { template, members, seconds })
+    Ok(Registration { template, members, confidence, seconds })
 }
 
 /// A scan with the template laid on it.
@@ -82,7 +93,7 @@ impl<'a> Laid<'a> {
             common.iter().map(|(at, target)| (template.point(&template.positions, at), *target)).unzip();
         let equal = vec![1.0; common.len()];
         let rotation = Similarity::between(&theirs, &own, &equal).rotation;
-        let scan = ScanSurface::turned(&subject.mesh, rotation, SAMPLES);
+        let scan = ScanSurface::weighted(&subject.mesh, subject.mask.as_deref(), rotation, SAMPLES);
         let targets: Vec<DVec3> = theirs.iter().map(|&p| scan.to_unit(p).as_dvec3()).collect();
         let laid = Similarity::between(&own, &targets, &equal);
         let start = template.positions.iter().map(|&p| laid.apply(p).as_vec3a()).collect();

@@ -115,6 +115,15 @@ pub const CRITERIA: &[Criterion] = &[
         value: |report| Some(report.precheck.damage),
     },
     Criterion {
+        code: "ragged_scan",
+        figure: "share of the scan's edges that have one triangle only",
+        worse: Worse::Above,
+        review: 0.1,
+        fail: None,
+        advice: "weld vertices where seams are open, and fill small holes",
+        value: |report| Some(report.fidelity.scan.rim),
+    },
+    Criterion {
         code: "fragmented_scan",
         figure: "share of the scan's area in its largest part",
         worse: Worse::Below,
@@ -130,7 +139,7 @@ pub const CRITERIA: &[Criterion] = &[
         review: 0.88,
         fail: Some(0.7),
         advice: "look for what the result leaves out: a second object, a deep cavity, hair",
-        value: |report| Some(report.fidelity.coverage.scan),
+        value: |report| Some(report.fidelity.overlap.scan),
     },
     Criterion {
         code: "off_scan",
@@ -139,16 +148,16 @@ pub const CRITERIA: &[Criterion] = &[
         review: 0.85,
         fail: Some(0.6),
         advice: "look at `_RESIDUAL` for where the result spans a gap or was led astray by landmarks",
-        value: |report| Some(report.fidelity.coverage.mesh),
+        value: |report| Some(report.fidelity.overlap.mesh),
     },
     Criterion {
         code: "little_data",
         figure: "share of the result that is over the scan, not over holes or beyond its rim",
         worse: Worse::Below,
-        review: 0.6,
-        fail: Some(0.2),
+        review: 0.35,
+        fail: Some(0.1),
         advice: "what is not over the scan is a guess; give a more complete scan",
-        value: |report| Some(report.fidelity.coverage.mesh_over_scan),
+        value: |report| Some(report.fidelity.overlap.mesh_over_scan),
     },
     Criterion {
         code: "surface_distance",
@@ -160,7 +169,7 @@ pub const CRITERIA: &[Criterion] = &[
         value: |report| {
             let ways = [report.fidelity.scan_to_mesh, report.fidelity.mesh_to_scan];
             let largest = ways.into_iter().flatten().map(|way| way.p50).reduce(f64::max)?;
-            ratio(largest, report.fidelity.coverage.tolerance)
+            ratio(largest, report.fidelity.overlap.tolerance)
         },
     },
     Criterion {

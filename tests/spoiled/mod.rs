@@ -162,7 +162,7 @@ pub const FAULTS: &[Fault] = &[
             })
         },
     },
-    Fault { name: "triangles torn apart", reasons: &["fragmented_scan"], spoil: |all, at| torn(&all[at]) },
+    Fault { name: "triangles torn apart", reasons: &["ragged_scan"], spoil: |all, at| torn(&all[at]) },
     Fault {
         name: "every triangle twice, both ways",
         reasons: &["damaged_scan"],
@@ -170,7 +170,7 @@ pub const FAULTS: &[Fault] = &[
     },
     Fault {
         name: "half of the triangles missing",
-        reasons: &["little_data", "fragmented_scan"],
+        reasons: &["ragged_scan"],
         spoil: |all, at| moth_eaten(&all[at]),
     },
     Fault {

@@ -55,6 +55,22 @@ pub enum CollectionError {
         /// The files' names.
         files: Vec<String>,
     },
+    /// A scan has several masks.
+    #[error("scan `{name}` has several masks ({}): keep one", files.join(", "))]
+    SeveralMasks {
+        /// The scan.
+        name: String,
+        /// The files' names.
+        files: Vec<String>,
+    },
+    /// The mask that a manifest names is not there.
+    #[error("scan `{name}` has no mask: {} does not exist", path.display())]
+    MissingMask {
+        /// The scan.
+        name: String,
+        /// Where it should be.
+        path: PathBuf,
+    },
     /// The mesh that a manifest names is not there.
     #[error("scan `{name}` has no mesh: {} does not exist", path.display())]
     MissingMesh {

@@ -3,7 +3,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use super::{CollectionError, Source};
-use crate::formats::{LandmarkFile, MeshFormat};
+use crate::formats::{LandmarkFile, MaskFile, MeshFormat};
 
 /// The scans in a folder, in folders of their own or side by side.
 pub(super) fn sources(folder: &Path) -> Result<Vec<Source>, CollectionError> {
@@ -11,33 +11,43 @@ pub(super) fn sources(folder: &Path) -> Result<Vec<Source>, CollectionError> {
     for path in entries(folder)? {
         if path.is_dir() {
             if let Some(mesh) = scan_in(&path)? {
-                sources.push(source(file_name(&path)?, mesh, &path.join("landmarks"))?);
+                sources.push(source(file_name(&path)?, mesh, |kind| path.join(kind))?);
             }
         } else if is_mesh(&path) {
             let name = stem(&path)?;
-            let landmarks = folder.join(format!("{name}.landmarks"));
-            sources.push(source(name, path, &landmarks)?);
+            let beside = |kind: &str| folder.join(format!("{name}.{kind}"));
+            sources.push(source(name.clone(), path, beside)?);
         }
     }
     Ok(sources)
 }
 
-/// A scan whose landmarks' file is called as `landmarks`, with an extension; where there is none, the first is missed.
-fn source(name: String, mesh: PathBuf, landmarks: &Path) -> Result<Source, CollectionError> {
-    let with = |extension: &str| {
-        let mut path = landmarks.as_os_str().to_owned();
-        path.push(".");
-        path.push(extension);
-        PathBuf::from(path)
-    };
-    let mut there: Vec<_> =
-        LandmarkFile::EXTENSIONS.map(with).into_iter().filter(|path| path.exists()).collect();
+/// A scan whose files of landmarks and mask are called as `beside` says, with an extension; where there are no
+/// landmarks, the first are missed.
+fn source(name: String, mesh: PathBuf, beside: impl Fn(&str) -> PathBuf) -> Result<Source, CollectionError> {
+    let [landmarks, mask] = ["landmarks", "mask"].map(beside);
+    let names = |paths: &[PathBuf]| paths.iter().map(|path| file_name(path)).collect::<Result<Vec<_>, _>>();
+    let mut there = existing(&landmarks, &LandmarkFile::EXTENSIONS);
     if there.len() > 1 {
-        let files = there.iter().map(|path| file_name(path)).collect::<Result<_, _>>()?;
-        return Err(CollectionError::SeveralLandmarks { name, files });
+        return Err(CollectionError::SeveralLandmarks { name, files: names(&there)? });
     }
-    let landmarks = there.pop().unwrap_or_else(|| with(LandmarkFile::EXTENSIONS[0]));
-    Ok(Source { name, mesh, landmarks, scheme: None })
+    let mut masks = existing(&mask, &MaskFile::EXTENSIONS);
+    if masks.len() > 1 {
+        return Err(CollectionError::SeveralMasks { name, files: names(&masks)? });
+    }
+    let landmarks = there.pop().unwrap_or_else(|| with(&landmarks, LandmarkFile::EXTENSIONS[0]));
+    Ok(Source { name, mesh, landmarks, mask: masks.pop(), scheme: None })
+}
+
+fn with(path: &Path, extension: &str) -> PathBuf {
+    let mut path = path.as_os_str().to_owned();
+    path.push(".");
+    path.push(extension);
+    PathBuf::from(path)
+}
+
+fn existing(path: &Path, extensions: &[&str]) -> Vec<PathBuf> {
+    extensions.iter().map(|extension| with(path, extension)).filter(|path| path.exists()).collect()
 }
 
 /// The mesh in a scan's folder: that called `scan`, or the only one.

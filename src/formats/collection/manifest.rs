@@ -16,6 +16,7 @@ struct Entry {
     name: String,
     mesh: PathBuf,
     landmarks: PathBuf,
+    mask: Option<PathBuf>,
     scheme: Option<String>,
 }
 
@@ -30,6 +31,7 @@ pub(super) fn sources(path: &Path) -> Result<Vec<Source>, CollectionError> {
         name: entry.name,
         mesh: folder.join(entry.mesh),
         landmarks: folder.join(entry.landmarks),
+        mask: entry.mask.map(|mask| folder.join(mask)),
         scheme: entry.scheme.or_else(|| scheme.clone()),
     };
     Ok(scans.into_iter().map(source).collect())

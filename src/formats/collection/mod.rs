@@ -11,6 +11,7 @@ use std::path::{Path, PathBuf};
 
 use super::input::{InputFile, read_file};
 use super::landmarks::LandmarkFile;
+use super::mask::MaskFile;
 use super::mesh_file::MeshFile;
 use crate::mesh::{LandmarkSet, TriangleMesh};
 pub use error::CollectionError;
@@ -32,6 +33,8 @@ pub struct Member {
     pub landmarks_file: InputFile,
     /// The landmarks, perhaps by vertices or triangles of the mesh.
     pub landmarks: LandmarkFile,
+    /// The file of its mask, if it has one.
+    pub mask: Option<PathBuf>,
 }
 
 /// A scan that has been read whole.
@@ -43,7 +46,9 @@ pub struct Scan {
     pub mesh: TriangleMesh,
     /// Its landmarks, in the same space.
     pub landmarks: LandmarkSet,
-    /// All files it was read from: the mesh, what the mesh names, the landmarks.
+    /// How much each vertex counts as data `[N]`, 0 to 1, if it has a mask.
+    pub mask: Option<Vec<f32>>,
+    /// All files it was read from: the mesh, what the mesh names, the landmarks, the mask.
     pub inputs: Vec<InputFile>,
 }
 
@@ -52,6 +57,7 @@ struct Source {
     name: String,
     mesh: PathBuf,
     landmarks: PathBuf,
+    mask: Option<PathBuf>,
     /// What the landmarks are called, if their own file does not say.
     scheme: Option<String>,
 }
@@ -61,9 +67,9 @@ impl Collection {
     ///
     /// A folder holds `NAME/scan.ply` with `NAME/landmarks.json`, or `NAME.ply` with `NAME.landmarks.json`, where the
     /// mesh may also be OBJ, STL, GLB or glTF, and the landmarks any of [`LandmarkFile::EXTENSIONS`]; of several meshes
-    /// in `NAME/`, that called `scan` is taken. Folders without a mesh and names that begin with a dot are passed over.
-    /// A manifest is `{"scans": [{"name": "...", "mesh": "path", "landmarks": "path"}, ...]}`, paths relative to its
-    /// folder; its `"scheme"`, or that of a scan, is for landmarks whose own file states none.
+    /// in `NAME/`, that called `scan` is taken. `NAME/mask.json` or `NAME.mask.json`, or `.png`, is its mask. Folders without a mesh and names that begin with a dot are passed over.
+    /// A manifest is `{"scans": [{"name": "...", "mesh": "path", "landmarks": "path"}, ...]}`, perhaps with a
+    /// `"mask": "path"`, paths relative to its folder; its `"scheme"`, or that of a scan, is for landmarks whose own file states none.
     ///
     /// # Errors
     /// [`CollectionError`] names the scan or the file, and what was expected.
@@ -101,12 +107,15 @@ impl Collection {
 
 impl Member {
     fn open(source: Source) -> Result<Self, CollectionError> {
-        let Source { name, mesh, landmarks: file, scheme } = source;
+        let Source { name, mesh, landmarks: file, mask, scheme } = source;
         if !mesh.exists() {
             return Err(CollectionError::MissingMesh { name, path: mesh });
         }
         if !file.exists() {
             return Err(CollectionError::MissingLandmarks { name, expected: file });
+        }
+        if let Some(path) = mask.iter().find(|path| !path.exists()) {
+            return Err(CollectionError::MissingMask { name, path: path.clone() });
         }
         let read = || {
             let bytes = read_file(&file)?;
@@ -117,12 +126,12 @@ impl Member {
             Ok((InputFile::of(&file, &bytes), landmarks.map_err(|error| error.in_file(&file))?))
         };
         match read() {
-            Ok((landmarks_file, landmarks)) => Ok(Self { name, mesh, landmarks_file, landmarks }),
+            Ok((landmarks_file, landmarks)) => Ok(Self { name, mesh, landmarks_file, landmarks, mask }),
             Err(error) => Err(CollectionError::Scan { name, error }),
         }
     }
 
-    /// Reads the scan's mesh, and finds the landmarks on it.
+    /// Reads the scan's mesh, and finds the landmarks and the mask on it.
     ///
     /// # Errors
     /// [`CollectionError::Scan`] with the file and what is wrong in it.
@@ -132,7 +141,14 @@ impl Member {
         let landmarks = self.landmarks.on(&file);
         let landmarks = landmarks.map_err(|error| failed(error.in_file(&self.landmarks_file.path)))?;
         inputs.push(self.landmarks_file.clone());
-        Ok(Scan { name: self.name.clone(), mesh: file.mesh, landmarks, inputs })
+        let mask = self.mask.as_ref().map(|path| {
+            let bytes = read_file(path)?;
+            inputs.push(InputFile::of(path, &bytes));
+            let mask = MaskFile::parse(&bytes).and_then(|mask| mask.on(&file, &landmarks));
+            mask.map_err(|error| error.in_file(path))
+        });
+        let mask = mask.transpose().map_err(failed)?;
+        Ok(Scan { name: self.name.clone(), mesh: file.mesh, landmarks, mask, inputs })
     }
 }
 

@@ -222,3 +222,40 @@ fn a_manifest_states_schemes() {
     let error = Collection::open(folder.path().join("m.json")).unwrap_err().to_string();
     assert!(error.contains("51.json: the landmarks: are 50, but multipie51 has 51"), "{error}");
 }
+
+#[test]
+fn a_mask_is_found_beside_its_scan() {
+    let manifest = r#"{"scans": [{"name": "one", "mesh": "amy.obj", "landmarks": "amy.landmarks.json",
+        "mask": "masks/one.json"}]}"#;
+    let files = [
+        ("amy.obj", OBJ),
+        ("amy.landmarks.json", POINTS),
+        ("amy.mask.json", "[1, 0.5, 0]"),
+        ("zoe/scan.obj", OBJ),
+        ("zoe/landmarks.json", POINTS),
+        ("zoe/mask.json", r#"{"spheres": [{"landmark": "b", "radius": 0.1}]}"#),
+        ("bob.obj", OBJ),
+        ("bob.landmarks.json", POINTS),
+        ("masks/one.json", "[0, 0, 1]"),
+        ("masks/all.json", manifest),
+    ];
+    let folder = folder(&files);
+    let masks = |path: &Path| -> Vec<_> {
+        let collection = Collection::open(path).unwrap();
+        collection.members().iter().map(|member| member.read().unwrap().mask).collect()
+    };
+    assert_eq!(masks(folder.path()), [Some(vec![1.0, 0.5, 0.0]), None, Some(vec![1.0, 0.0, 1.0])]);
+    let scan = Collection::open(folder.path()).unwrap().members()[0].read().unwrap();
+    assert_eq!(scan.inputs[2].path, folder.path().join("amy.mask.json"));
+    fs::write(folder.path().join("all.json"), manifest).unwrap();
+    assert_eq!(masks(&folder.path().join("all.json")), [Some(vec![0.0, 0.0, 1.0])]);
+    fs::remove_file(folder.path().join("masks/one.json")).unwrap();
+    let missing = Collection::open(folder.path().join("all.json")).unwrap_err().to_string();
+    assert!(missing.contains("one.json does not exist"), "{missing}");
+    fs::write(folder.path().join("amy.mask.json"), "[1]").unwrap();
+    let wrong = Collection::open(folder.path()).unwrap().members()[0].read().unwrap_err().to_string();
+    assert!(wrong.contains("`amy`") && wrong.contains("amy.mask.json") && wrong.contains("are 1"), "{wrong}");
+    fs::write(folder.path().join("amy.mask.png"), "").unwrap();
+    let several = Collection::open(folder.path()).unwrap_err().to_string();
+    assert!(several.contains("amy.mask.json, amy.mask.png"), "{several}");
+}

@@ -12,6 +12,8 @@ mod surface;
 #[cfg(test)]
 mod tests;
 
+use serde_json::Value;
+
 use super::error::Fault;
 use super::geometry::Geometry;
 use super::glb;
@@ -20,6 +22,14 @@ use super::weld::weld;
 use buffer::Buffers;
 use container::Container;
 use document::Document;
+
+/// The `extras` of the default scene of a glTF or GLB, if it is one and has any.
+pub fn scene_extras(bytes: &[u8]) -> Option<Value> {
+    let container = Container::split(bytes).ok()?;
+    let mut document: Value = serde_json::from_slice(container.json).ok()?;
+    let scene = document.get("scene").and_then(Value::as_u64).unwrap_or(0);
+    document.get_mut("scenes")?.get_mut(usize::try_from(scene).ok()?)?.get_mut("extras").map(Value::take)
+}
 
 /// Reads all triangles, strips and fans of the scene, each node's transform applied, and closes their seams. Colours,
 /// texture coordinates and base colour pictures come along.

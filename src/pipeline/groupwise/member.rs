@@ -21,6 +21,9 @@ const INERTIA: f64 = 0.1;
 /// Matches farther than this pull towards the sample itself; nearer ones more and more only along its normal.
 const FAR: f32 = 0.03;
 
+/// Cosine between normals of surfaces that do not belong together.
+const TURNED: f32 = 0.5;
+
 /// Share of the phases after which far samples no longer lead: the template lies on the scan, follows what is near, and
 /// every vertex is held by some point of it.
 const SETTLED: f64 = 0.65;
@@ -85,6 +88,13 @@ struct Registration<'a> {
     buffer: SolveBuffer,
 }
 
+/// The closest scan point of a vertex, and how much it counts as data.
+#[derive(Clone, Copy)]
+struct VertexHit {
+    hit: Hit,
+    weight: f32,
+}
+
 /// A scan sample, the template point it pulls, and how firmly: far samples pull no harder than [`FAR`] away.
 struct SampleHit {
     sample: SurfaceSample,
@@ -132,17 +142,19 @@ impl<'a> Registration<'a> {
         let ramp = |ramp: [f32; 2]| geometric(ramp.map(f64::from), x) as f32;
         let stiffness = geometric(settings.stiffness, x);
         let settled = x >= SETTLED;
+        // What hangs behind an open scan is held by nothing: the sheet in front turns its back on it.
+        let held = settled && !self.scan.open;
         self.phase = Phase {
             stiffness,
             // As firm as the shape is stiff, so that landmarks lead from the beginning.
             landmark_weight: settings.landmark_weight * stiffness.max(1.0),
             normal_search: ramp(settings.normal_search),
-            reach: if settled { f32::INFINITY } else { ramp(settings.reach) },
+            reach: if held { f32::INFINITY } else { ramp(settings.reach) },
             sample_reach: if settled { settings.sample_reach } else { ramp(settings.reach) },
             // Stiff, the shape has few ways to move and few samples show them all.
             samples: if settled { settings.samples } else { settings.samples / 4 },
             // Settled, every vertex is held by the scan, whichever way it looks: none is left to stick out.
-            least_cosine: if settled { -1.0 } else { settings.least_cosine },
+            least_cosine: if held { -1.0 } else { settings.least_cosine },
             fall_beyond: if x >= FALLING { settings.fall_beyond } else { 0.0 },
         };
         self.smoother = Some(self.rest.connectivity.diffusion(geometric(settings.smoothing, x)));
@@ -185,9 +197,8 @@ impl<'a> Registration<'a> {
     }
 
     /// How firmly data holds each vertex `[N]`.
-    fn data_weights(&self, vertices: &[Option<Hit>], samples: &[Option<SampleHit>]) -> Vec<f32> {
-        let mut weights: Vec<f32> =
-            vertices.iter().map(|hit| INERTIA as f32 + f32::from(u8::from(hit.is_some()))).collect();
+    fn data_weights(&self, vertices: &[Option<VertexHit>], samples: &[Option<SampleHit>]) -> Vec<f32> {
+        let mut weights: Vec<f32> = vertices.iter().map(|hit| INERTIA as f32 + weight_of(hit)).collect();
         for SampleHit { hit, weight, .. } in samples.iter().flatten() {
             let corners = self.rest.connectivity.topology.triangles[hit.triangle as usize];
             for (&i, w) in corners.iter().zip(hit.weights) {
@@ -197,7 +208,7 @@ impl<'a> Registration<'a> {
         weights
     }
 
-    fn match_vertices(&mut self) -> Vec<Option<Hit>> {
+    fn match_vertices(&mut self) -> Vec<Option<VertexHit>> {
         let (p, normals, scan) = (&self.p, &self.normals.vertices, self.scan);
         let (search, reach) = (self.phase.normal_search, self.phase.reach);
         let least_cosine = self.phase.least_cosine;
@@ -212,15 +223,19 @@ impl<'a> Registration<'a> {
                 Some(*hint),
             )?;
             *hint = hit.triangle;
-            (!scan.on_rim(&hit)).then_some(hit)
+            // What closes an open scan from within hangs between its walls, which are not for it.
+            let (normal, difference) = (scan.normal_at(&hit), p[i] - hit.point);
+            let within = difference.dot(normal) < -FAR && normals[i].dot(normal) < TURNED;
+            let weight = scan.weight_at(&hit);
+            (!within && weight > 0.0).then_some(VertexHit { hit, weight })
         };
         self.hints.par_iter_mut().enumerate().with_min_len(128).map(closest).collect()
     }
 
     /// Which matched vertices fall instead, and how far.
-    fn falls(&mut self, matches: &[Option<Hit>]) -> Vec<Option<Vec3A>> {
+    fn falls(&mut self, matches: &[Option<VertexHit>]) -> Vec<Option<Vec3A>> {
         let beyond = self.phase.fall_beyond;
-        let far = |hit: &Option<Hit>| hit.is_some_and(|hit| hit.distance_squared > beyond * beyond);
+        let far = |found: &Option<VertexHit>| found.is_some_and(|f| f.hit.distance_squared > beyond * beyond);
         if beyond <= 0.0 || !matches.iter().any(far) {
             return vec![None; matches.len()];
         }
@@ -234,10 +249,10 @@ impl<'a> Registration<'a> {
         (0..p.len()).into_par_iter().with_min_len(128).map(one).collect()
     }
 
-    fn match_samples(&mut self, vertices: &[Option<Hit>]) -> Vec<Option<SampleHit>> {
+    fn match_samples(&mut self, vertices: &[Option<VertexHit>]) -> Vec<Option<SampleHit>> {
         let (scan, index, settings) = (self.scan, &self.index, self.settings);
         let off: Vec<f32> =
-            vertices.iter().map(|hit| hit.map_or(f32::MAX, |hit| hit.distance_squared)).collect();
+            vertices.iter().map(|found| found.map_or(f32::MAX, |f| f.hit.distance_squared)).collect();
         let (triangles, rim) = (&self.rest.connectivity.topology.triangles, &self.rest.connectivity.rim);
         let free = |sample: &SurfaceSample, hit: &Hit| {
             let difference = sample.point - hit.point;
@@ -264,8 +279,9 @@ impl<'a> Registration<'a> {
                 None,
             );
             // What lies beyond the template's rim is not for it.
-            let hit = hit.filter(|hit| !rim.contains(hit.triangle, hit.weights) && free(&sample, hit))?;
-            let weight = (FAR / hit.distance_squared.sqrt().max(FAR)).min(1.0) * per_sample;
+            let is_for = |hit: &Hit| sample.weight > 0.0 && !rim.contains(hit.triangle, hit.weights);
+            let hit = hit.filter(|hit| is_for(hit) && free(&sample, hit))?;
+            let weight = (FAR / hit.distance_squared.sqrt().max(FAR)).min(1.0) * per_sample * sample.weight;
             Some(SampleHit { sample, hit, weight })
         };
         self.samples_taken += self.phase.samples;
@@ -275,17 +291,17 @@ impl<'a> Registration<'a> {
     /// Pull of each matched vertex to its closest point, mostly along the scan's normal, or along its fall.
     fn add_vertex_forces(
         &self,
-        matches: &[Option<Hit>],
+        matches: &[Option<VertexHit>],
         falls: &[Option<Vec3A>],
         force: &mut [Vec3A],
     ) -> f64 {
         let mut sum = 0.0;
-        for (i, (hit, fall)) in matches.iter().zip(falls).enumerate() {
-            if let Some(hit) = hit {
+        for (i, (found, fall)) in matches.iter().zip(falls).enumerate() {
+            if let Some(VertexHit { hit, weight }) = found {
                 let difference = hit.point - self.p[i];
                 sum += f64::from(difference.length());
                 let pull = || along(difference, self.scan.normal_at(hit), self.settings.plane);
-                force[i] += fall.unwrap_or_else(pull);
+                force[i] += fall.unwrap_or_else(pull) * *weight;
             }
         }
         sum / matches.len() as f64
@@ -324,9 +340,13 @@ impl<'a> Registration<'a> {
     }
 
     /// The half Hessian of everything but the planes' freedom, which it bounds from above.
-    fn factor(&self, vertices: &[Option<Hit>], samples: &[Option<SampleHit>]) -> Option<SparseCholesky> {
+    fn factor(
+        &self,
+        vertices: &[Option<VertexHit>],
+        samples: &[Option<SampleHit>],
+    ) -> Option<SparseCholesky> {
         let connectivity = &self.rest.connectivity;
-        let diagonal = vertices.iter().map(|hit| INERTIA + f64::from(u8::from(hit.is_some()))).collect();
+        let diagonal = vertices.iter().map(|hit| INERTIA + f64::from(weight_of(hit))).collect();
         let mut matrix = SymmetricMatrix { diagonal, edges: vec![0.0; connectivity.topology.edges.len()] };
         for SampleHit { hit, weight, .. } in samples.iter().flatten() {
             connectivity.add_point(&mut matrix, hit.triangle, hit.weights, f64::from(*weight));
@@ -338,6 +358,10 @@ impl<'a> Registration<'a> {
         self.rest.add_stiffness(self.phase.stiffness, &mut matrix);
         SparseCholesky::new(&connectivity.topology, &matrix, connectivity.dissection()).ok()
     }
+}
+
+fn weight_of(found: &Option<VertexHit>) -> f32 {
+    found.map_or(0.0, |found| found.weight)
 }
 
 /// A difference with this share of its part across the normal left out.

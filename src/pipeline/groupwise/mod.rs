@@ -8,6 +8,7 @@
 //! Cavities that only some members have, as open mouths, are closed by films in the mean; in the late phases these fall
 //! into the scans that have them (`film.rs`).
 
+mod closure;
 mod film;
 mod mean;
 mod member;
@@ -15,6 +16,7 @@ mod redistribution;
 mod rest_shape;
 mod shared_mesh;
 
+pub use closure::close_smoothly;
 pub use mean::mean_shape;
 pub use member::{Member, register_member};
 pub use redistribution::redistribute;

@@ -95,7 +95,7 @@ fn need(sphere: &Sphere, members: &[(&ScanSurface, &[Vec3A])], settings: &Groupw
             let asked = sample.curvature.clamp(1.0, 60.0).powf(settings.curvature_power);
             let corners = sphere.connectivity.topology.triangles[hit.triangle as usize];
             for (&i, w) in corners.iter().zip(hit.weights) {
-                own[i as usize] += w * asked;
+                own[i as usize] += w * asked * sample.weight;
             }
         }
         smoother.solve_scalar(&mut own, &mut SolveBuffer::default());
