@@ -3,6 +3,7 @@
 //! Readers trust nothing that a file says of itself: every count is held against the bytes that are there before
 //! memory is taken for it, so that memory stays within a small multiple of the file's size, and no input panics.
 
+mod area_normals;
 mod collection;
 mod digest;
 mod error;
@@ -13,12 +14,14 @@ mod input;
 mod landmarks;
 mod mesh_file;
 mod mesh_format;
+mod mesh_source;
 mod numbering;
 mod obj;
 mod output;
 mod ply;
 mod polygons;
 mod scheme;
+mod splices;
 mod stl;
 mod text;
 mod texture;
@@ -35,9 +38,10 @@ pub use input::InputFile;
 pub use landmarks::{LandmarkFile, landmarks_json, parse_landmarks, read_landmarks, write_landmarks};
 pub use mesh_file::MeshFile;
 pub use mesh_format::MeshFormat;
-pub use obj::{obj_bytes, write_obj};
+pub use mesh_source::MeshSource;
+pub use obj::{Obj, obj_bytes, write_obj};
 pub use output::write_whole;
-pub use ply::{ply_bytes, write_ply};
+pub use ply::{Ply, ply_bytes, write_ply};
 pub use polygons::Polygons;
 pub use scheme::{Region, Scheme};
 pub use texture::{ImageOrigin, Texture, TextureImage};
