@@ -1,5 +1,6 @@
 //! The paper's stages over a collection: fit, resample, register, and what we add to them. Layer 4.
 
+mod carried;
 mod comparison;
 mod connectivity;
 mod fit;
