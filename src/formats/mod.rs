@@ -29,7 +29,7 @@ mod weld;
 
 use std::path::Path;
 
-pub use collection::{Collection, CollectionError, Member, Scan};
+pub use collection::{Collection, CollectionError, Member, Refused, Scan};
 pub use digest::Sha256;
 pub use error::{Fault, FormatError};
 pub use glb::{Glb, glb_bytes, write_glb};

@@ -2,28 +2,31 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use super::{CollectionError, Source};
+use super::{CollectionError, Refused, Source};
 use crate::formats::{LandmarkFile, MeshFormat};
 
 /// The scans in a folder, in folders of their own or side by side.
-pub(super) fn sources(folder: &Path) -> Result<Vec<Source>, CollectionError> {
+pub(super) fn sources(folder: &Path) -> Result<Vec<Result<Source, Refused>>, CollectionError> {
     let mut sources = Vec::new();
     for path in entries(folder)? {
         if path.is_dir() {
-            if let Some(mesh) = scan_in(&path)? {
-                sources.push(source(file_name(&path)?, mesh, &path.join("landmarks"))?);
+            if let Some(mesh) = scan_in(&path).transpose() {
+                let name = file_name(&path)?;
+                let source = mesh.and_then(|mesh| source(&name, mesh, &path.join("landmarks")));
+                sources.push(source.map_err(|error| Refused::new(name, error)));
             }
         } else if is_mesh(&path) {
             let name = stem(&path)?;
             let landmarks = folder.join(format!("{name}.landmarks"));
-            sources.push(source(name, path, &landmarks)?);
+            let source = source(&name, path, &landmarks);
+            sources.push(source.map_err(|error| Refused::new(name, error)));
         }
     }
     Ok(sources)
 }
 
 /// A scan whose landmarks' file is called as `landmarks`, with an extension; where there is none, the first is missed.
-fn source(name: String, mesh: PathBuf, landmarks: &Path) -> Result<Source, CollectionError> {
+fn source(name: &str, mesh: PathBuf, landmarks: &Path) -> Result<Source, CollectionError> {
     let with = |extension: &str| {
         let mut path = landmarks.as_os_str().to_owned();
         path.push(".");
@@ -34,10 +37,10 @@ fn source(name: String, mesh: PathBuf, landmarks: &Path) -> Result<Source, Colle
         LandmarkFile::EXTENSIONS.map(with).into_iter().filter(|path| path.exists()).collect();
     if there.len() > 1 {
         let files = there.iter().map(|path| file_name(path)).collect::<Result<_, _>>()?;
-        return Err(CollectionError::SeveralLandmarks { name, files });
+        return Err(CollectionError::SeveralLandmarks { name: name.to_owned(), files });
     }
     let landmarks = there.pop().unwrap_or_else(|| with(LandmarkFile::EXTENSIONS[0]));
-    Ok(Source { name, mesh, landmarks, scheme: None })
+    Ok(Source { name: name.to_owned(), mesh, landmarks, scheme: None })
 }
 
 /// The mesh in a scan's folder: that called `scan`, or the only one.
