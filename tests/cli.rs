@@ -7,7 +7,7 @@ use std::path::Path;
 use std::process::{Command, Output};
 
 use common::{QUICK, command, quick_register, write_collection};
-use onemesh::formats::{Sha256, read_landmarks, read_mesh, write_landmarks};
+use onemesh::formats::{MeshFile, Sha256, obj_bytes, read_landmarks, read_mesh, write_landmarks};
 use serde_json::Value;
 
 /// Runs the program.
@@ -60,7 +60,10 @@ fn a_collection_is_registered() {
         assert_eq!(entry["inputs"][0]["file"], format!("{name}/scan.ply"));
         let digest = |path: &Path| Sha256::of(&fs::read(path).unwrap()).to_string();
         assert_eq!(entry["inputs"][0]["sha256"], digest(&scans.join(name).join("scan.ply")));
-        assert_eq!(entry["output_sha256"], digest(&path));
+        assert_eq!(
+            entry["outputs"],
+            serde_json::json!([{ "file": format!("{name}.glb"), "sha256": digest(&path) }])
+        );
         let scan = &report["scans"][at];
         assert!(scan["scan_to_mesh"]["p50"].as_f64().unwrap() < 2.0, "{scan}");
         assert_eq!(scan["landmarks"].as_object().unwrap().len(), 68);
@@ -116,6 +119,11 @@ fn one_scan_is_fitted_and_measured() {
     let printed: Value = serde_json::from_str(&succeeded(&onemesh(arguments.iter().chain(&quick)))).unwrap();
     assert_eq!(printed["vertices"], 642);
     validate(&mesh);
+    let formats = ["--format", "obj,ply"].map(Path::new);
+    succeeded(&onemesh(arguments.iter().chain(&quick).chain(&formats)));
+    let others = ["obj", "ply"].map(|extension| read_mesh(mesh.with_extension(extension)).unwrap());
+    assert_eq!(others[0], others[1]);
+    assert_eq!(others[0].triangles(), read_mesh(&mesh).unwrap().triangles());
     let said = succeeded(&onemesh([Path::new("evaluate"), &scan, &mesh]));
     let measured: Value = serde_json::from_str(&said).unwrap();
     let chamfer = measured["meshes"][mesh.to_str().unwrap()]["chamfer"].as_f64().unwrap();
@@ -191,13 +199,15 @@ fn what_cannot_be_registered_is_said_clearly() {
     (3..68).for_each(|at| few.points[at] = None);
     few.points[2] = None;
     write_landmarks(&landmarks, &few).unwrap();
+    // One fails alone, both for its own reason.
+    fs::remove_file(scans.join(&names[0]).join("landmarks.json")).unwrap();
     let said = register();
-    assert!(said.contains("only 2 landmarks") && said.contains("scans"), "{said}");
+    assert!(said.contains("has 2 landmarks") && said.contains("no scan is left"), "{said}");
+    assert!(said.contains("has no landmarks") && said.contains(&names[0]), "{said}");
     fs::write(&landmarks, "[[1, 2]]").unwrap();
     let said = register();
     assert!(said.contains("landmarks.json") && said.contains(&names[1]), "{said}");
-    fs::remove_file(&landmarks).unwrap();
-    assert!(register().contains("has no landmarks"));
+    write_landmarks(scans.join(&names[0]).join("landmarks.json"), &few).unwrap();
 
     fs::remove_dir_all(scans.join(&names[1])).unwrap();
     fs::write(scans.join(&names[0]).join("scan.ply"), "ply\nformat ascii 1.0\nelement vertex 9").unwrap();
@@ -233,6 +243,98 @@ fn a_collection_of_which_nothing_can_be_used_ends_in_an_error() {
     let report = json(out.join("report.json"));
     assert_eq!(report["scans"][1]["verdict"], "fail");
     assert_eq!(report["scans"][1]["reasons"][0]["verdict"], "fail");
+}
+
+#[test]
+fn one_bad_scan_fails_alone_and_the_rest_has_every_format() {
+    let folder = tempfile::tempdir().unwrap();
+    let (scans, out) = (folder.path().join("scans"), folder.path().join("out"));
+    let names = write_collection(&scans, 4);
+    fs::write(scans.join(&names[0]).join("scan.ply"), "ply\nformat ascii 1.0\nelement vertex 9").unwrap();
+    let landmarks = scans.join(&names[2]).join("landmarks.json");
+    let mut strange = read_landmarks(&landmarks).unwrap();
+    strange.scheme = None;
+    strange.names.iter_mut().for_each(|name| name.insert_str(0, "own "));
+    write_landmarks(&landmarks, &strange).unwrap();
+    let mut arguments = quick_register(&scans, &out);
+    arguments.extend(["--format", "ply,glb,obj,glb"].map(Into::into));
+    let output = onemesh(arguments);
+    let said = complaint(&output);
+    assert_eq!(output.status.code(), Some(3), "{said}");
+    assert!(said.contains("2 of 4 scans are left out"), "{said}");
+    assert!(said.contains(&format!("{}: left out: ", names[0])), "{said}");
+    let (manifest, report) = (json(out.join("manifest.json")), json(out.join("report.json")));
+    let failed: Vec<&Value> =
+        report["failed"].as_array().unwrap().iter().map(|failed| &failed["name"]).collect();
+    assert_eq!(failed, [&names[0], &names[2]]);
+    assert!(report["failed"][0]["problem"].as_str().unwrap().contains("scan.ply"), "{report}");
+    assert!(!out.join(format!("{}.glb", names[0])).exists());
+    for (at, name) in [&names[1], &names[3]].into_iter().enumerate() {
+        let entry = &manifest["scans"][at];
+        assert_eq!(entry["name"], **name);
+        let outputs = entry["outputs"].as_array().unwrap();
+        let files: Vec<&Value> = outputs.iter().map(|output| &output["file"]).collect();
+        assert_eq!(files, [&format!("{name}.ply"), &format!("{name}.glb"), &format!("{name}.obj")]);
+        let [ply, glb, obj] = [0, 1, 2].map(|k| out.join(outputs[k]["file"].as_str().unwrap()));
+        for (path, output) in [&ply, &glb, &obj].into_iter().zip(outputs) {
+            assert_eq!(output["sha256"], Sha256::of(&fs::read(path).unwrap()).to_string());
+        }
+        let [ply, glb, obj] = [ply, glb, obj].map(|path| MeshFile::read(path).unwrap());
+        assert_eq!(
+            (ply.mesh.triangles(), obj.mesh.triangles()),
+            (glb.mesh.triangles(), glb.mesh.triangles())
+        );
+        assert_eq!(ply.mesh.positions(), obj.mesh.positions());
+        for (double, single) in ply.mesh.positions().iter().zip(glb.mesh.positions()) {
+            assert!(double.distance(*single) < 1e-5, "{double} {single}");
+        }
+        let uv = |file: &MeshFile| file.vertex_texture_coordinates().unwrap();
+        assert!(uv(&obj).iter().zip(uv(&glb)).all(|(a, b)| a.distance(b) < 1e-6));
+    }
+}
+
+#[test]
+fn results_are_in_the_template_s_own_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let (scans, out) = (folder.path().join("scans"), folder.path().join("out"));
+    let names = write_collection(&scans, 2);
+    let template = folder.path().join("own.obj");
+    let head = read_mesh(scans.join(&names[0]).join("scan.ply")).unwrap();
+    let text =
+        String::from_utf8(obj_bytes(&head)).unwrap().replacen("f ", "# by hand\ng face\nusemtl skin\nf ", 1);
+    fs::write(&template, &text).unwrap();
+    fs::copy(scans.join(&names[0]).join("landmarks.json"), folder.path().join("own.landmarks.json")).unwrap();
+    let register = |more: &[&str]| {
+        let fixed =
+            [Path::new("register"), &scans, Path::new("-o"), &out, Path::new("--template"), &template];
+        let quick = ["--set", "transfer.iterations=2", "--set", "transfer.rounds=1"];
+        onemesh(fixed.into_iter().chain(quick.iter().chain(more).map(Path::new)))
+    };
+    succeeded(&register(&[]));
+    for name in &names {
+        let written = fs::read_to_string(out.join(format!("{name}.obj"))).unwrap();
+        let glb = read_mesh(out.join(format!("{name}.glb"))).unwrap();
+        let own = read_mesh(out.join(format!("{name}.obj"))).unwrap();
+        assert_eq!(own.triangles(), glb.triangles());
+        assert!(own.positions().iter().zip(glb.positions()).all(|(a, b)| a.distance(*b) < 1e-5));
+        let rest = |text: &str| -> Vec<String> {
+            text.lines().filter(|line| !line.starts_with("v ")).map(str::to_owned).collect()
+        };
+        assert_eq!(rest(&written), rest(&text));
+        assert_ne!(written, text);
+    }
+    let manifest = json(out.join("manifest.json"));
+    assert_eq!(manifest["scans"][0]["outputs"][1]["file"], format!("{}.obj", names[0]));
+
+    fs::remove_dir_all(&out).unwrap();
+    succeeded(&register(&["--format", "obj,template"]));
+    assert!(
+        out.join(format!("{}.template.obj", names[1])).exists()
+            && out.join(format!("{}.obj", names[1])).exists()
+    );
+    assert!(!out.join(format!("{}.glb", names[1])).exists());
+    let without = complaint(&onemesh(["register", "nowhere", "-o", "nowhere", "--format", "template"]));
+    assert!(without.contains("--format template"), "{without}");
 }
 
 #[test]

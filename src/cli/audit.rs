@@ -1,10 +1,10 @@
 use std::path::{Path, PathBuf};
 
-use onemesh::pipeline::audit_landmarks;
+use onemesh::pipeline::{FailedScan, audit_landmarks};
 use onemesh::preflight::LandmarkAudit;
 
 use super::findings::print_findings;
-use super::register::read;
+use super::register::{Reading, read};
 
 /// Holds the landmarks of a collection against each other and against their scans.
 #[derive(Debug, clap::Args)]
@@ -19,7 +19,9 @@ pub struct Audit {
 impl Audit {
     /// Does it.
     pub fn run(self) -> anyhow::Result<()> {
-        let (subjects, _) = read(&self.collection)?;
+        let Reading { subjects, failed, .. } = read(&self.collection)?;
+        failed.iter().for_each(|FailedScan { name, problem }| eprintln!("{name}: left out: {problem}"));
+        anyhow::ensure!(!subjects.is_empty(), "{}: no scan is left to audit", self.collection.display());
         let audit = audit_landmarks(&subjects);
         if self.json {
             println!("{}", serde_json::to_string_pretty(&audit)?);

@@ -7,6 +7,7 @@ use onemesh::evaluate::{
 };
 use onemesh::formats::{landmarks_json, ply_bytes, write_whole};
 use onemesh::mesh::TriangleMesh;
+use onemesh::pipeline::Outputs;
 use serde_json::json;
 
 use super::parameters::Parameters;
@@ -39,7 +40,7 @@ impl Demo {
         let collection = write_heads(&heads, &self.output)?;
         println!("{} heads are sculpted: {}", heads.len(), collection.display());
         let results = self.output.join("result");
-        let outcome = register_collection(&collection, &results, None, &settings)?;
+        let outcome = register_collection(&collection, &results, None, Outputs::GLB, &settings)?;
         outcome.print(&results);
         let figures = correspondence(&heads, &outcome)?;
         if let Some(distances) = figures.distances {

@@ -4,10 +4,11 @@ use std::time::Instant;
 use anyhow::Context;
 use glam::DVec3;
 use onemesh::evaluate::{Fidelity, surface_figures};
-use onemesh::formats::{Glb, read_mesh, write_glb};
+use onemesh::formats::{read_mesh, write_whole};
 use onemesh::mesh::{Icosphere, Topology, TriangleMesh, sphere_layout};
-use onemesh::pipeline::{fit_scan, vertex_normals};
+use onemesh::pipeline::{ResultMesh, fit_scan};
 
+use super::formats::Formats;
 use super::parameters::Parameters;
 use super::progress::ProgressBars;
 
@@ -16,9 +17,11 @@ use super::progress::ProgressBars;
 pub struct Fit {
     /// The scan: OBJ, PLY, STL, glTF or GLB
     scan: PathBuf,
-    /// The GLB to write
+    /// The GLB, OBJ or PLY to write; with --format, for each format under its own extension
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
+    #[command(flatten)]
+    formats: Formats,
     #[command(flatten)]
     parameters: Parameters,
 }
@@ -27,6 +30,7 @@ impl Fit {
     /// Does it.
     pub fn run(self) -> anyhow::Result<()> {
         let settings = self.parameters.for_fit()?;
+        let outputs = self.formats.of_file(&self.output)?;
         let scan = read_mesh(&self.scan)?;
         let name = self.scan.file_stem().map_or("scan".into(), |stem| stem.to_string_lossy());
         let start = Instant::now();
@@ -40,14 +44,16 @@ impl Fit {
         // Without landmarks the scan is taken to look along +Z.
         let layout = sphere_layout(&topology, &sphere.positions, DVec3::Z, DVec3::Y);
         let residuals = Fidelity::of(&scan, &mesh).residuals;
-        let glb = Glb {
+        let result = ResultMesh {
             name: &name,
-            normals: Some(&vertex_normals(&mesh)),
+            mesh: &mesh,
             texture_coordinates: Some(&layout),
-            scalars: vec![("_RESIDUAL", &residuals)],
-            ..Glb::new(&mesh)
+            figures: vec![("residual", &residuals)],
+            extras: serde_json::Value::Null,
         };
-        write_glb(&self.output, &glb)?;
+        for (format, path) in outputs {
+            write_whole(&path, &result.bytes(format, None).map_err(|error| error.in_file(&path))?)?;
+        }
         println!("{}", serde_json::to_string_pretty(&surface_figures(&scan, &mesh, false))?);
         Ok(())
     }

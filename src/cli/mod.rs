@@ -6,6 +6,7 @@ mod demo;
 mod evaluate;
 mod findings;
 mod fit;
+mod formats;
 mod inspect;
 mod parameters;
 mod progress;
@@ -24,13 +25,16 @@ pub use inspect::Inspect;
 pub use register::Register;
 pub use threads::Threads;
 
+/// The exit code where some scans were left out and the others are delivered; wrong arguments have 2.
+const PARTIAL: u8 = 3;
+
 /// Says what went wrong, if anything did, and how the program ends.
 pub fn finish(outcome: anyhow::Result<()>) -> ExitCode {
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("error: {error:#}");
-            ExitCode::FAILURE
+            if error.is::<register::LeftOut>() { ExitCode::from(PARTIAL) } else { ExitCode::FAILURE }
         }
     }
 }

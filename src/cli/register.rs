@@ -2,29 +2,36 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use anyhow::{Context, ensure};
-use onemesh::formats::{Collection, InputFile, Scan};
+use onemesh::formats::{Collection, CollectionError, InputFile, Refused, Scan};
 use onemesh::pipeline::{
-    Package, Registration, Report, Settings, Subject, Template, Verdict, precheck, register, register_to,
-    spare_inputs,
+    FailedScan, Outputs, Package, Registration, Report, Settings, Subject, Template, Verdict, leave_out,
+    precheck, register, register_to, spare_inputs,
 };
 use rayon::prelude::*;
 
 use super::findings::warn;
+use super::formats::Formats;
 use super::parameters::Parameters;
 use super::progress::ProgressBars;
-use super::template::TemplateFiles;
+use super::template::{GivenTemplate, TemplateFiles};
 
 /// Registers a collection: the same triangles on every scan.
+///
+/// A scan that cannot be read, or has too few landmarks in common with the others or with the template, is left out: it
+/// is named on the error stream and under `failed` in report.json, the others are delivered, and the exit code is 3. It
+/// is 1 where nothing is delivered.
 #[derive(Debug, clap::Args)]
 pub struct Register {
     /// A folder of `NAME/scan.ply` with `NAME/landmarks.json`, or of `NAME.ply` with `NAME.landmarks.json`; or a JSON
     /// manifest that names them
     collection: PathBuf,
-    /// The folder to write to: `NAME.glb` for each scan, manifest.json, report.json, sheet.png
+    /// The folder to write to: `NAME.glb`, or as --format says, for each scan, manifest.json, report.json, sheet.png
     #[arg(short, long, value_name = "FOLDER")]
     output: PathBuf,
     #[command(flatten)]
     template: TemplateFiles,
+    #[command(flatten)]
+    formats: Formats,
     #[command(flatten)]
     parameters: Parameters,
 }
@@ -32,12 +39,15 @@ pub struct Register {
 impl Register {
     /// Does it.
     pub fn run(self) -> anyhow::Result<()> {
-        let (template, frozen) = self.template.read()?.unzip();
-        let settings = match frozen.flatten() {
+        let GivenTemplate { template, settings, source } = self.template.read()?;
+        let settings = match settings {
             Some(settings) => self.parameters.over_frozen(settings)?,
             None => self.parameters.for_registration()?,
         };
-        let outcome = register_collection(&self.collection, &self.output, template.as_ref(), &settings)?;
+        let formats = self.formats.of_registration(source.as_ref())?;
+        let outputs = Outputs { formats: &formats, source: source.as_ref() };
+        let outcome =
+            register_collection(&self.collection, &self.output, template.as_ref(), outputs, &settings)?;
         outcome.print(&self.output);
         let failed = outcome.report.count(Verdict::Fail);
         ensure!(
@@ -46,8 +56,19 @@ impl Register {
             self.collection.display(),
             if failed == 1 { "the only one failed".to_owned() } else { format!("all {failed} failed") }
         );
-        Ok(())
+        match outcome.report.failed.len() {
+            0 => Ok(()),
+            failed => Err(LeftOut { failed, of: failed + outcome.subjects.len() }.into()),
+        }
     }
+}
+
+/// Some scans were left out, the others are delivered.
+#[derive(Debug, thiserror::Error)]
+#[error("{failed} of {of} scans are left out, see `failed` in report.json; the others are delivered")]
+pub struct LeftOut {
+    failed: usize,
+    of: usize,
 }
 
 /// A registered collection that has been written.
@@ -65,15 +86,19 @@ pub fn register_collection(
     collection: &Path,
     output: &Path,
     template: Option<&Template>,
+    outputs: Outputs,
     settings: &Settings,
 ) -> anyhow::Result<Outcome> {
     let start = Instant::now();
     let bars = ProgressBars::new();
     let spinner = bars.spinner("reading");
-    let (subjects, inputs) = read(collection)?;
-    let reading = start.elapsed().as_secs_f64();
+    let reading = read(collection)?;
+    let Reading { subjects, inputs, failed } = reading.registrable(template);
+    let seconds = start.elapsed().as_secs_f64();
     spinner.finish_and_clear();
-    spare_inputs(output, &subjects, &inputs)?;
+    failed.iter().for_each(|FailedScan { name, problem }| eprintln!("{name}: left out: {problem}"));
+    ensure!(!subjects.is_empty(), "{}: no scan is left to register", collection.display());
+    spare_inputs(output, &subjects, &inputs, &outputs)?;
     let prechecks = precheck(&subjects);
     for (subject, precheck) in subjects.iter().zip(&prechecks) {
         warn(&subject.name, &precheck.findings);
@@ -92,22 +117,58 @@ pub fn register_collection(
         root,
         settings,
         registration: &registration,
-        reading,
+        outputs,
+        failed: &failed,
+        reading: seconds,
     };
     let report = package.write(output)?;
     spinner.finish_and_clear();
     Ok(Outcome { subjects, registration, report })
 }
 
-/// The scans of a collection and the files they were read from.
-pub fn read(collection: &Path) -> anyhow::Result<(Vec<Subject>, Vec<Vec<InputFile>>)> {
-    let collection = Collection::open(collection)?;
-    let scans: Result<Vec<Scan>, _> = collection.members().par_iter().map(|member| member.read()).collect();
-    let split = |scan: Scan| {
-        let Scan { name, mesh, landmarks, mask, inputs } = scan;
-        (Subject { name, mesh, landmarks, mask }, inputs)
+/// A collection that has been read.
+pub struct Reading {
+    /// The scans.
+    pub subjects: Vec<Subject>,
+    /// The files each was read from.
+    pub inputs: Vec<Vec<InputFile>>,
+    /// The scans that cannot be used.
+    pub failed: Vec<FailedScan>,
+}
+
+/// Reads the scans of a collection as far as they can be read.
+pub fn read(collection: &Path) -> anyhow::Result<Reading> {
+    let (collection, refused) = Collection::open_usable(collection)?;
+    let failed = |name: &str, error: &CollectionError| FailedScan {
+        name: name.to_owned(),
+        problem: error.to_string(),
     };
-    Ok(scans?.into_iter().map(split).unzip())
+    let mut reading = Reading { subjects: Vec::new(), inputs: Vec::new(), failed: Vec::new() };
+    reading.failed.extend(refused.into_iter().map(|Refused { name, error }| failed(&name, &error)));
+    let scans: Vec<_> = collection.members().par_iter().map(|member| (&member.name, member.read())).collect();
+    for (name, scan) in scans {
+        match scan {
+            Ok(Scan { name, mesh, landmarks, mask, inputs }) => {
+                reading.subjects.push(Subject { name, mesh, landmarks, mask });
+                reading.inputs.push(inputs);
+            }
+            Err(error) => reading.failed.push(failed(name, &error)),
+        }
+    }
+    Ok(reading)
+}
+
+impl Reading {
+    /// Without the scans that cannot be registered with the others, or from the template.
+    fn registrable(mut self, template: Option<&Template>) -> Self {
+        let left_out = leave_out(&self.subjects, template);
+        let stays = |subject: &Subject| left_out.iter().all(|failed| failed.name != subject.name);
+        let (subjects, inputs) =
+            self.subjects.into_iter().zip(self.inputs).filter(|(subject, _)| stays(subject)).unzip();
+        self.failed.extend(left_out);
+        self.failed.sort_by(|a, b| a.name.cmp(&b.name));
+        Self { subjects, inputs, failed: self.failed }
+    }
 }
 
 impl Outcome {

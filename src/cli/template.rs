@@ -1,7 +1,7 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
-use onemesh::formats::{LandmarkFile, MeshFile};
+use onemesh::formats::{LandmarkFile, MeshSource};
 use onemesh::pipeline::{FrozenCollection, Settings, Template};
 
 /// A template of the user's.
@@ -15,20 +15,33 @@ pub struct TemplateFiles {
     template_landmarks: Option<PathBuf>,
 }
 
+/// What a template brings.
+#[derive(Debug, Default)]
+pub struct GivenTemplate {
+    /// The template, where one is given.
+    pub template: Option<Template>,
+    /// With a frozen collection, its settings.
+    pub settings: Option<Settings>,
+    /// With a mesh of the user's, its file.
+    pub source: Option<MeshSource>,
+}
+
 impl TemplateFiles {
-    /// Reads it, where one is given, and with a frozen collection its settings.
-    pub fn read(&self) -> anyhow::Result<Option<(Template, Option<Settings>)>> {
-        let Some(path) = &self.template else { return Ok(None) };
+    /// Reads it, where one is given.
+    pub fn read(&self) -> anyhow::Result<GivenTemplate> {
+        let Some(path) = &self.template else { return Ok(GivenTemplate::default()) };
         let shown = || path.display().to_string();
         let bytes = std::fs::read(path).with_context(shown)?;
-        Ok(Some(match FrozenCollection::parse(&bytes).with_context(shown)? {
-            Some(FrozenCollection { template, settings }) => (template, Some(settings)),
-            None => (self.of_mesh(path)?, None),
-        }))
+        Ok(match FrozenCollection::parse(&bytes).with_context(shown)? {
+            Some(FrozenCollection { template, settings }) => {
+                GivenTemplate { template: Some(template), settings: Some(settings), source: None }
+            }
+            None => self.of_mesh(path)?,
+        })
     }
 
-    fn of_mesh(&self, path: &Path) -> anyhow::Result<Template> {
-        let file = MeshFile::read(path)?;
+    fn of_mesh(&self, path: &Path) -> anyhow::Result<GivenTemplate> {
+        let source = MeshSource::read(path)?;
         let landmarks = match self.template_landmarks.clone().or_else(|| beside(path)) {
             Some(landmarks) => LandmarkFile::read(landmarks)?,
             None => anyhow::bail!(
@@ -37,8 +50,9 @@ impl TemplateFiles {
                 path.file_stem().unwrap_or_default().to_string_lossy(),
             ),
         };
-        let landmarks = landmarks.on(&file).with_context(|| path.display().to_string())?;
-        Ok(Template::of_file(&file, &landmarks))
+        let landmarks = landmarks.on(&source.file).with_context(|| path.display().to_string())?;
+        let template = Template::of_file(&source.file, &landmarks);
+        Ok(GivenTemplate { template: Some(template), settings: None, source: Some(source) })
     }
 }
 

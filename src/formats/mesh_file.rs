@@ -77,17 +77,25 @@ impl MeshFile {
 
     /// The file at `path` and those it was read from, the first of them `path` itself; pictures are not read.
     pub(super) fn read_with_inputs(path: &Path) -> Result<(Self, Vec<InputFile>), FormatError> {
-        let bytes = input::read_file(path)?;
+        let (file, _, inputs) = Self::of_bytes(&input::read_file(path)?, path)?;
+        Ok((file, inputs))
+    }
+
+    /// The file at `path`, which holds `bytes`; its format, and those it was read from, the first of them itself.
+    pub(super) fn of_bytes(
+        bytes: &[u8],
+        path: &Path,
+    ) -> Result<(Self, MeshFormat, Vec<InputFile>), FormatError> {
         let siblings = Siblings::of(path);
         let extension = path.extension().and_then(|e| e.to_str());
-        let file = match MeshFormat::sniff(&bytes, extension) {
-            Some(format) => Self::parse_beside(&bytes, format, &siblings),
-            None => Err(Fault::UnknownFormat { start: text::shown(&bytes) }),
+        let read = match MeshFormat::sniff(bytes, extension) {
+            Some(format) => Self::parse_beside(bytes, format, &siblings).map(|file| (file, format)),
+            None => Err(Fault::UnknownFormat { start: text::shown(bytes) }),
         };
-        let file = file.map_err(|fault| FormatError::from(fault).in_file(path))?;
-        let mut inputs = vec![InputFile::of(path, &bytes)];
+        let (file, format) = read.map_err(|fault| FormatError::from(fault).in_file(path))?;
+        let mut inputs = vec![InputFile::of(path, bytes)];
         inputs.extend(siblings.into_read());
-        Ok((file, inputs))
+        Ok((file, format, inputs))
     }
 
     fn parse_beside(bytes: &[u8], format: MeshFormat, siblings: &Siblings) -> Result<Self, Fault> {

@@ -3,6 +3,7 @@
 //! Readers trust nothing that a file says of itself: every count is held against the bytes that are there before
 //! memory is taken for it, so that memory stays within a small multiple of the file's size, and no input panics.
 
+mod area_normals;
 mod collection;
 mod digest;
 mod error;
@@ -14,12 +15,14 @@ mod landmarks;
 mod mask;
 mod mesh_file;
 mod mesh_format;
+mod mesh_source;
 mod numbering;
 mod obj;
 mod output;
 mod ply;
 mod polygons;
 mod scheme;
+mod splices;
 mod stl;
 mod text;
 mod texture;
@@ -27,7 +30,7 @@ mod weld;
 
 use std::path::Path;
 
-pub use collection::{Collection, CollectionError, Member, Scan};
+pub use collection::{Collection, CollectionError, Member, Refused, Scan};
 pub use digest::Sha256;
 pub use error::{Fault, FormatError};
 pub use glb::{Glb, glb_bytes, write_glb};
@@ -37,9 +40,10 @@ pub use landmarks::{LandmarkFile, landmarks_json, parse_landmarks, read_landmark
 pub use mask::MaskFile;
 pub use mesh_file::MeshFile;
 pub use mesh_format::MeshFormat;
-pub use obj::{obj_bytes, write_obj};
+pub use mesh_source::MeshSource;
+pub use obj::{Obj, obj_bytes, write_obj};
 pub use output::write_whole;
-pub use ply::{ply_bytes, write_ply};
+pub use ply::{Ply, ply_bytes, write_ply};
 pub use polygons::Polygons;
 pub use scheme::{Region, Scheme};
 pub use texture::{ImageOrigin, Texture, TextureImage};

@@ -13,6 +13,13 @@ impl Polygons {
         Self { corners: Vec::with_capacity(3 * polygons), ends: Vec::with_capacity(polygons) }
     }
 
+    /// Triangles `[F, 3]` as polygons.
+    pub fn of_triangles(triangles: &[[u32; 3]]) -> Self {
+        let mut polygons = Self::with_capacity(triangles.len());
+        triangles.iter().for_each(|&corners| polygons.push_triangle(corners));
+        polygons
+    }
+
     /// The number of polygons P.
     pub fn len(&self) -> usize {
         self.ends.len()

@@ -2,6 +2,8 @@ use std::path::PathBuf;
 
 use glam::DVec2;
 
+use super::polygons::Polygons;
+
 /// How pictures lie on the polygons of a mesh file; everything as the file has it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Texture {
@@ -43,6 +45,17 @@ pub enum TextureImage {
 impl Texture {
     /// No entry: the corner has no texture coordinates, or the polygon no picture.
     pub const NONE: u32 = u32::MAX;
+
+    /// Coordinates of each vertex `[N, 2]`, (0, 0) in the picture's upper left corner, on polygons; without a picture.
+    pub fn of_vertices(coordinates: &[DVec2], polygons: &Polygons) -> Self {
+        Self {
+            coordinates: coordinates.to_vec(),
+            corners: polygons.corners().to_vec(),
+            polygon_images: vec![Self::NONE; polygons.len()],
+            images: Vec::new(),
+            origin: ImageOrigin::UpperLeft,
+        }
+    }
 
     /// The texture coordinates of polygon corner `corner`, if it has any.
     pub fn coordinate(&self, corner: usize) -> Option<DVec2> {

@@ -56,10 +56,17 @@ pub struct ScanEntry {
     pub name: String,
     /// Every file it was read from.
     pub inputs: Vec<InputEntry>,
-    /// The result's file.
-    pub output: String,
-    /// The digest of that file.
-    pub output_sha256: Sha256,
+    /// Every file of its result.
+    pub outputs: Vec<OutputEntry>,
+}
+
+/// A file that was written.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct OutputEntry {
+    /// Its name.
+    pub file: String,
+    /// The digest of its bytes.
+    pub sha256: Sha256,
 }
 
 /// A file that was read.

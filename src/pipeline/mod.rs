@@ -1,5 +1,6 @@
 //! The paper's stages over a collection: fit, resample, register, and what we add to them. Layer 4.
 
+mod carried;
 mod comparison;
 mod confidence;
 mod connectivity;
@@ -11,7 +12,9 @@ mod known;
 mod manifest;
 mod mask;
 mod matching;
+mod membership;
 mod observer;
+mod output;
 mod package;
 mod precheck;
 mod presets;
@@ -33,9 +36,11 @@ pub use connectivity::Connectivity;
 pub use fit::{SphereLandmark, fit};
 pub use frozen::{FrozenCollection, FrozenError};
 pub use head::head;
-pub use manifest::{InputEntry, LandmarkEntry, Manifest, ScanEntry, TemplateEntry};
+pub use manifest::{InputEntry, LandmarkEntry, Manifest, OutputEntry, ScanEntry, TemplateEntry};
 pub use mask::MaskError;
+pub use membership::{FailedScan, leave_out};
 pub use observer::{Canceled, Observer, Progress, Stage, Watch};
+pub use output::{OutputFormat, Outputs, ResultMesh};
 pub use package::{Package, PackageError, spare_inputs, vertex_normals};
 pub use precheck::{Precheck, audit_landmarks, precheck};
 pub use register::{LEAST_LANDMARKS, RegisterError, Registration, Subject, fit_scan, register};

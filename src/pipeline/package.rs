@@ -1,4 +1,4 @@
-//! What a registration leaves behind: a GLB for each scan, the manifest, the report and the comparison sheet.
+//! What a registration leaves behind: each scan's result, the manifest, the report and the comparison sheet.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -12,12 +12,14 @@ use serde_json::{Value, json};
 
 use super::comparison::comparison_sheet;
 use super::frozen::{FrozenCollection, FrozenError};
-use super::manifest::{InputEntry, Manifest, ScanEntry, TemplateEntry};
+use super::manifest::{InputEntry, Manifest, OutputEntry, ScanEntry, TemplateEntry};
+use super::membership::FailedScan;
+use super::output::{OutputFormat, Outputs, ResultMesh};
 use super::precheck::Precheck;
 use super::register::{Registration, Subject};
 use super::report::{Report, ScanReport, position};
 use super::settings::Settings;
-use crate::formats::{FormatError, Glb, InputFile, Sha256, glb_bytes, write_whole};
+use crate::formats::{FormatError, InputFile, Sha256, write_whole};
 use crate::mesh::{MeshError, TriangleMesh};
 use crate::picture::PictureError;
 
@@ -43,6 +45,10 @@ pub struct Package<'a> {
     pub settings: &'a Settings,
     /// The results.
     pub registration: &'a Registration,
+    /// What is written for each.
+    pub outputs: Outputs<'a>,
+    /// The scans that were left out.
+    pub failed: &'a [FailedScan],
     /// How long the scans took to read.
     pub reading: f64,
 }
@@ -58,10 +64,10 @@ pub enum PackageError {
         /// What the system says.
         error: io::Error,
     },
-    /// A result would take the place of a scan.
-    #[error("{}: is a file of the collection and would be overwritten: choose another folder", path.display())]
+    /// A result would take the place of a scan or of the template.
+    #[error("{}: is a file of the collection or the template and would be overwritten: choose another folder", path.display())]
     Overwrites {
-        /// The scan's file.
+        /// The file.
         path: PathBuf,
     },
     /// A result is no mesh.
@@ -84,7 +90,7 @@ pub enum PackageError {
 }
 
 impl Package<'_> {
-    /// Writes everything to `folder`, which is made where it is not there: `NAME.glb` for each scan, in the scan's own
+    /// Writes everything to `folder`, which is made where it is not there: the outputs for each scan, in the scan's own
     /// space and units, `template.frozen.glb`, `sheet.png`, `report.json`, and last `manifest.json`. Every file is written whole or not at all.
     ///
     /// # Errors
@@ -93,7 +99,7 @@ impl Package<'_> {
         let start = Instant::now();
         fs::create_dir_all(folder)
             .map_err(|error| PackageError::Folder { path: folder.to_owned(), error })?;
-        spare_inputs(folder, self.subjects, self.inputs)?;
+        spare_inputs(folder, self.subjects, self.inputs, &self.outputs)?;
         let results = self.results()?;
         let scans = self
             .subjects
@@ -104,20 +110,20 @@ impl Package<'_> {
             .map(|(((subject, precheck), result), confidence)| {
                 let report =
                     ScanReport::of(subject, precheck, result, confidence, &self.registration.template);
-                let bytes = self.glb(subject, result, &report, confidence)?;
-                write_whole(folder.join(file_of(&subject.name)), &bytes)?;
-                Ok((report, Sha256::of(&bytes)))
+                let outputs = self.write_outputs(folder, subject, result, &report, confidence)?;
+                Ok((report, outputs))
             })
             .collect::<Result<Vec<_>, PackageError>>()?;
         let Registration { template, .. } = self.registration;
         let frozen = FrozenCollection { template: template.clone(), settings: self.settings.clone() };
         write_whole(folder.join(TEMPLATE), &frozen.glb_bytes()?)?;
         write_whole(folder.join(SHEET), &comparison_sheet(self.subjects, &results).png_bytes()?)?;
-        let (scans, digests): (Vec<_>, Vec<_>) = scans.into_iter().unzip();
+        let (scans, outputs): (Vec<_>, Vec<_>) = scans.into_iter().unzip();
         let seconds = self.seconds(start.elapsed().as_secs_f64());
-        let report = Report { record: RECORD, program: program(), seconds, scans };
+        let failed = self.failed.to_vec();
+        let report = Report { record: RECORD, program: program(), seconds, scans, failed };
         write_json(&folder.join(REPORT), &report)?;
-        write_json(&folder.join(MANIFEST), &self.manifest(&digests))?;
+        write_json(&folder.join(MANIFEST), &self.manifest(outputs))?;
         Ok(report)
     }
 
@@ -130,23 +136,28 @@ impl Package<'_> {
         self.subjects.iter().zip(members).map(result).collect()
     }
 
-    fn glb(
+    fn write_outputs(
         &self,
+        folder: &Path,
         subject: &Subject,
         result: &TriangleMesh,
         report: &ScanReport,
         confidence: &[f32],
-    ) -> Result<Vec<u8>, FormatError> {
+    ) -> Result<Vec<OutputEntry>, FormatError> {
         let confidence: Vec<f64> = confidence.iter().copied().map(f64::from).collect();
-        let glb = Glb {
+        let mesh = ResultMesh {
             name: &subject.name,
-            normals: Some(&vertex_normals(result)),
+            mesh: result,
             texture_coordinates: self.registration.template.texture_coordinates.as_deref(),
-            scalars: vec![("_RESIDUAL", &report.fidelity.residuals), ("_CONFIDENCE", &confidence)],
+            figures: vec![("residual", &report.fidelity.residuals), ("confidence", &confidence)],
             extras: self.extras(result),
-            ..Glb::new(result)
         };
-        glb_bytes(&glb).map_err(|error| error.in_file(file_of(&subject.name)))
+        let write = |(format, file): (OutputFormat, String)| {
+            let bytes = mesh.bytes(format, self.outputs.source).map_err(|error| error.in_file(&file))?;
+            write_whole(folder.join(&file), &bytes)?;
+            Ok(OutputEntry { file, sha256: Sha256::of(&bytes) })
+        };
+        self.outputs.files(&subject.name).into_iter().map(write).collect()
     }
 
     /// The template's landmarks on a result, as landmark files have them and with their places on the triangles.
@@ -168,19 +179,18 @@ impl Package<'_> {
         stages.chain(around.map(|(name, seconds)| (name.to_owned(), seconds))).collect()
     }
 
-    fn manifest(&self, digests: &[Sha256]) -> Manifest {
-        let entry = |((subject, inputs), &output_sha256): ((&Subject, &Vec<InputFile>), &Sha256)| ScanEntry {
+    fn manifest(&self, outputs: Vec<Vec<OutputEntry>>) -> Manifest {
+        let entry = |((subject, inputs), outputs): ((&Subject, &Vec<InputFile>), _)| ScanEntry {
             name: subject.name.clone(),
             inputs: inputs.iter().map(|input| InputEntry::of(input, self.root)).collect(),
-            output: file_of(&subject.name),
-            output_sha256,
+            outputs,
         };
         Manifest {
             record: RECORD,
             program: program(),
             settings: self.settings.clone(),
             template: TemplateEntry::of(&self.registration.template),
-            scans: self.subjects.iter().zip(self.inputs).zip(digests).map(entry).collect(),
+            scans: self.subjects.iter().zip(self.inputs).zip(outputs).map(entry).collect(),
             report: REPORT.to_owned(),
             sheet: SHEET.to_owned(),
         }
@@ -196,12 +206,14 @@ pub fn spare_inputs(
     folder: &Path,
     subjects: &[Subject],
     inputs: &[Vec<InputFile>],
+    outputs: &Outputs,
 ) -> Result<(), PackageError> {
-    let outputs = subjects.iter().map(|subject| file_of(&subject.name));
+    let template = outputs.source.map_or(&[][..], |source| &source.inputs);
+    let outputs = subjects.iter().flat_map(|subject| outputs.files(&subject.name)).map(|(_, file)| file);
     let outputs = outputs.chain([MANIFEST, REPORT, SHEET, TEMPLATE].map(str::to_owned));
     let outputs: Vec<PathBuf> = outputs.filter_map(|name| fs::canonicalize(folder.join(name)).ok()).collect();
     let is_output = |input: &&InputFile| fs::canonicalize(&input.path).is_ok_and(|at| outputs.contains(&at));
-    match inputs.iter().flatten().find(is_output) {
+    match inputs.iter().flatten().chain(template).find(is_output) {
         Some(input) => Err(PackageError::Overwrites { path: input.path.clone() }),
         None => Ok(()),
     }
@@ -209,10 +221,6 @@ pub fn spare_inputs(
 
 fn program() -> String {
     format!("onemesh {}", env!("CARGO_PKG_VERSION"))
-}
-
-fn file_of(name: &str) -> String {
-    format!("{name}.glb")
 }
 
 fn write_json(path: &Path, record: &impl serde::Serialize) -> Result<(), FormatError> {

@@ -2,6 +2,7 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
+use super::membership::FailedScan;
 use super::precheck::Precheck;
 use super::register::Subject;
 use super::template::Template;
@@ -20,6 +21,8 @@ pub struct Report {
     pub seconds: BTreeMap<String, f64>,
     /// The scans in their order.
     pub scans: Vec<ScanReport>,
+    /// The scans that were left out.
+    pub failed: Vec<FailedScan>,
 }
 
 /// How well the template lies on one scan; lengths are in the scan's units.

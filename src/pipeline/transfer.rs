@@ -7,6 +7,7 @@ use std::time::Instant;
 use glam::{DVec3, Vec3A};
 use rayon::prelude::*;
 
+use super::carried::Parts;
 use super::confidence::confidence;
 use super::connectivity::Connectivity;
 use super::groupwise::{Member, RestShape, mean_shape, register_member};
@@ -28,6 +29,9 @@ use crate::numeric::Similarity;
 /// groupwise stage, from stiff to soft. In further rounds the mean of the results takes the template's place; not if the
 /// template is frozen: then a scan's result is the same whatever else is registered.
 ///
+/// Components of the template that carry no landmark, eyeballs for instance, are matched to nothing: each follows the
+/// others around it and keeps its shape.
+///
 /// # Errors
 /// [`RegisterError`] for an empty collection, a scan with too few of the template's landmarks, or a request to stop.
 pub fn register_to(
@@ -41,6 +45,23 @@ pub fn register_to(
     }
     check_masks(subjects)?;
     let start = Instant::now();
+    let parts = Parts::of(template);
+    let mut registration = register_main(&parts.main, subjects, settings, observer)?;
+    registration.members = registration.members.iter().map(|member| parts.carry(member)).collect();
+    registration.confidence = registration.confidence.iter().map(|main| parts.confidence(main)).collect();
+    let positions = parts.carry(&registration.template.positions);
+    registration.template = Template { positions, ..template.clone() };
+    registration.seconds = BTreeMap::from([(Stage::Register, start.elapsed().as_secs_f64())]);
+    Ok(registration)
+}
+
+/// Registers what is matched to the scans.
+fn register_main(
+    template: &Template,
+    subjects: &[Subject],
+    settings: &Settings,
+    observer: &dyn Observer,
+) -> Result<Registration, RegisterError> {
     let rest: Vec<Vec3A> = template.positions.iter().map(|p| p.as_vec3a()).collect();
     let connectivity = Arc::new(Connectivity::new(&rest, &template.triangles));
     let members: Vec<Laid> =
@@ -73,8 +94,7 @@ pub fn register_to(
         .collect();
     let back = |(member, shape): (&Laid, Vec<Vec3A>)| shape.iter().map(|p| member.scan.to_scan(*p)).collect();
     let members = members.iter().zip(shapes).map(back).collect();
-    let seconds = BTreeMap::from([(Stage::Register, start.elapsed().as_secs_f64())]);
-    Ok(Registration { template, members, confidence, seconds })
+    Ok(Registration { template, members, confidence, seconds: BTreeMap::new() })
 }
 
 /// A scan with the template laid on it.

@@ -3,7 +3,7 @@ use std::time::Instant;
 
 use anyhow::Context;
 use onemesh::mesh::TriangleMesh;
-use onemesh::pipeline::{Preset, Settings, fit_scan};
+use onemesh::pipeline::{Outputs, Preset, Settings, fit_scan};
 
 use super::clock::{Clock, row};
 use super::{memory, sculpt};
@@ -69,7 +69,7 @@ pub fn collection(path: &Path) -> anyhow::Result<()> {
     let settings = Settings::preset(Preset::Default, 10242)?;
     memory::forget_peak();
     let start = Instant::now();
-    let outcome = register_collection(path, &output.0, None, &settings)?;
+    let outcome = register_collection(path, &output.0, None, Outputs::GLB, &settings)?;
     let elapsed = start.elapsed();
     let peak = memory::peak().map_or("memory unknown".to_owned(), |peak| format!("{peak:.0} MiB at most"));
     row(

@@ -2,21 +2,24 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use super::{CollectionError, Source};
+use super::{CollectionError, Refused, Source};
 use crate::formats::{LandmarkFile, MaskFile, MeshFormat};
 
 /// The scans in a folder, in folders of their own or side by side.
-pub(super) fn sources(folder: &Path) -> Result<Vec<Source>, CollectionError> {
+pub(super) fn sources(folder: &Path) -> Result<Vec<Result<Source, Refused>>, CollectionError> {
     let mut sources = Vec::new();
     for path in entries(folder)? {
         if path.is_dir() {
-            if let Some(mesh) = scan_in(&path)? {
-                sources.push(source(file_name(&path)?, mesh, |kind| path.join(kind))?);
+            if let Some(mesh) = scan_in(&path).transpose() {
+                let name = file_name(&path)?;
+                let source = mesh.and_then(|mesh| source(&name, mesh, |kind| path.join(kind)));
+                sources.push(source.map_err(|error| Refused::new(name, error)));
             }
         } else if is_mesh(&path) {
             let name = stem(&path)?;
             let beside = |kind: &str| folder.join(format!("{name}.{kind}"));
-            sources.push(source(name.clone(), path, beside)?);
+            let source = source(&name, path, beside);
+            sources.push(source.map_err(|error| Refused::new(name, error)));
         }
     }
     Ok(sources)
@@ -24,8 +27,9 @@ pub(super) fn sources(folder: &Path) -> Result<Vec<Source>, CollectionError> {
 
 /// A scan whose files of landmarks and mask are called as `beside` says, with an extension; where there are no
 /// landmarks, the first are missed.
-fn source(name: String, mesh: PathBuf, beside: impl Fn(&str) -> PathBuf) -> Result<Source, CollectionError> {
+fn source(name: &str, mesh: PathBuf, beside: impl Fn(&str) -> PathBuf) -> Result<Source, CollectionError> {
     let [landmarks, mask] = ["landmarks", "mask"].map(beside);
+    let name = name.to_owned();
     let names = |paths: &[PathBuf]| paths.iter().map(|path| file_name(path)).collect::<Result<Vec<_>, _>>();
     let mut there = existing(&landmarks, &LandmarkFile::EXTENSIONS);
     if there.len() > 1 {

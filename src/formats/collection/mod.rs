@@ -52,6 +52,21 @@ pub struct Scan {
     pub inputs: Vec<InputFile>,
 }
 
+/// A scan that cannot be used, and why.
+#[derive(Debug)]
+pub struct Refused {
+    /// Its name.
+    pub name: String,
+    /// What is wrong.
+    pub error: Box<CollectionError>,
+}
+
+impl Refused {
+    fn new(name: impl Into<String>, error: CollectionError) -> Self {
+        Self { name: name.into(), error: Box::new(error) }
+    }
+}
+
 /// Where a scan's files are.
 struct Source {
     name: String,
@@ -74,17 +89,39 @@ impl Collection {
     /// # Errors
     /// [`CollectionError`] names the scan or the file, and what was expected.
     pub fn open(path: impl AsRef<Path>) -> Result<Self, CollectionError> {
-        let path = path.as_ref();
-        let mut sources = if path.is_dir() { folder::sources(path)? } else { manifest::sources(path)? };
-        if sources.is_empty() {
-            return Err(CollectionError::Empty { path: path.to_owned() });
-        }
-        sources.sort_by(|a, b| a.name.cmp(&b.name));
-        check_names(&sources)?;
-        let members = sources.into_iter().map(Member::open).collect::<Result<Vec<_>, _>>()?;
+        let members: Result<Vec<Member>, Refused> = members(path.as_ref())?.into_iter().collect();
+        let members = members.map_err(|refused| *refused.error)?;
         check_schemes(&members)?;
         check_common(&members)?;
         Ok(Self { members })
+    }
+
+    /// Opens a collection as [`open`](Self::open) does, without the scans that have something wrong with them; these are
+    /// told beside it. Of several landmark schemes that of the most scans, or else of the first, counts. That scans have
+    /// landmarks in common is not looked at.
+    ///
+    /// # Errors
+    /// [`CollectionError`] if the folder or the manifest as a whole cannot be read, holds no scan, or names scans wrongly.
+    pub fn open_usable(path: impl AsRef<Path>) -> Result<(Self, Vec<Refused>), CollectionError> {
+        let mut refused = Vec::new();
+        let members = members(path.as_ref())?.into_iter();
+        let mut members: Vec<Member> =
+            members.filter_map(|member| member.map_err(|error| refused.push(error)).ok()).collect();
+        let most = usual_scheme(&members).map(|(member, scheme)| (member.name.clone(), scheme.to_owned()));
+        if let Some((first, first_scheme)) = most {
+            members.retain(|member| match member.landmarks.scheme() {
+                Some(scheme) if scheme != first_scheme => {
+                    let (second, second_scheme) = (member.name.clone(), scheme.to_owned());
+                    let (first, first_scheme) = (first.clone(), first_scheme.clone());
+                    let error = CollectionError::SchemesDiffer { first, first_scheme, second, second_scheme };
+                    refused.push(Refused::new(&member.name, error));
+                    false
+                }
+                _ => true,
+            });
+        }
+        refused.sort_by(|a, b| a.name.cmp(&b.name));
+        Ok((Self { members }, refused))
     }
 
     /// Its members, sorted by name.
@@ -152,22 +189,57 @@ impl Member {
     }
 }
 
-fn check_names(sources: &[Source]) -> Result<(), CollectionError> {
+/// The scans of a folder or manifest with their landmarks, sorted by name, each as far as it can be used.
+fn members(path: &Path) -> Result<Vec<Result<Member, Refused>>, CollectionError> {
+    let mut sources = if path.is_dir() { folder::sources(path)? } else { manifest::sources(path)? };
+    if sources.is_empty() {
+        return Err(CollectionError::Empty { path: path.to_owned() });
+    }
+    sources.sort_by(|a, b| name_of(a).cmp(name_of(b)));
+    check_names(&sources)?;
+    let open = |source: Source| {
+        let name = source.name.clone();
+        Member::open(source).map_err(|error| Refused::new(name, error))
+    };
+    Ok(sources.into_iter().map(|source| source.and_then(open)).collect())
+}
+
+fn name_of(source: &Result<Source, Refused>) -> &str {
+    match source {
+        Ok(source) => &source.name,
+        Err(refused) => &refused.name,
+    }
+}
+
+/// The scheme that most members state, and the first that does.
+fn usual_scheme(members: &[Member]) -> Option<(&Member, &str)> {
+    let stated = || members.iter().filter_map(|member| Some((member, member.landmarks.scheme()?)));
+    let count = |scheme: &str| stated().filter(|(_, other)| *other == scheme).count();
+    let schemes: BTreeSet<&str> = stated().map(|(_, scheme)| scheme).collect();
+    let most = schemes.into_iter().map(count).max()?;
+    stated().find(|(_, scheme)| count(scheme) == most)
+}
+
+fn check_names(sources: &[Result<Source, Refused>]) -> Result<(), CollectionError> {
     let unfit = |name: &str| {
         name.is_empty()
             || name.starts_with('.')
             || name.contains(|c: char| c.is_control() || "/\\:".contains(c))
     };
-    if let Some(source) = sources.iter().find(|source| unfit(&source.name)) {
-        return Err(CollectionError::BadName { name: source.name.clone() });
+    if let Some(name) = sources.iter().map(name_of).find(|name| unfit(name)) {
+        return Err(CollectionError::BadName { name: name.to_owned() });
     }
-    match sources.windows(2).find(|pair| pair[0].name == pair[1].name) {
-        Some([first, second]) => Err(CollectionError::DuplicateName {
+    let twice = sources.windows(2).find_map(|pair| match pair {
+        [Ok(first), Ok(second)] if first.name == second.name => Some((first, second)),
+        _ => None,
+    });
+    match twice {
+        Some((first, second)) => Err(CollectionError::DuplicateName {
             name: first.name.clone(),
             first: first.mesh.clone(),
             second: second.mesh.clone(),
         }),
-        _ => Ok(()),
+        None => Ok(()),
     }
 }
 

@@ -1,3 +1,5 @@
+use std::ops::Range;
+
 use glam::{DVec2, DVec3};
 
 use super::buffer::Buffers;
@@ -22,6 +24,39 @@ pub(super) fn positions(buffers: &Buffers, index: usize) -> Result<Vec<DVec3>, F
             Err(Fault::at(place, problem))
         }
         None => Ok(positions),
+    }
+}
+
+/// Where the vectors of an accessor lie in their buffer, as 32-bit floats.
+pub(super) struct Vectors {
+    pub buffer: usize,
+    start: usize,
+    stride: usize,
+    count: usize,
+}
+
+impl Vectors {
+    /// Of accessor `index`.
+    pub fn of(buffers: &Buffers, index: usize) -> Result<Self, Fault> {
+        let place = format!("accessors[{index}]");
+        let accessor = buffers.document().accessor(index)?;
+        expect_shape(&accessor, "VEC3", &place)?;
+        let component = Component::coded(accessor.component_type, &place)?;
+        let (Component::F32, None, Some(view)) = (component, &accessor.sparse, accessor.buffer_view) else {
+            let problem = "cannot take the places of results: save the mesh with plain 32-bit floats, \
+                           neither quantized nor sparse";
+            return Err(Fault::at(place, problem));
+        };
+        let item = Item { component, width: 3 };
+        let Strided { stride, count, .. } =
+            Strided::new(buffers, view, accessor.byte_offset, accessor.count, item, &place)?;
+        let view = buffers.document().buffer_view(view)?;
+        Ok(Self { buffer: view.buffer, start: view.byte_offset + accessor.byte_offset, stride, count })
+    }
+
+    /// Where each lies.
+    pub fn ranges(&self) -> impl Iterator<Item = Range<usize>> {
+        (0..self.count).map(|at| self.start + at * self.stride).map(|start| start..start + 12)
     }
 }
 

@@ -95,7 +95,8 @@ impl<'a> Buffers<'a> {
         Ok((bytes, view.byte_stride))
     }
 
-    fn bytes(&self, index: usize) -> Result<&[u8], Fault> {
+    /// The bytes of a buffer.
+    pub fn bytes(&self, index: usize) -> Result<&[u8], Fault> {
         let cell = self.loaded.get(index);
         if let Some(bytes) = cell.and_then(OnceCell::get) {
             return Ok(bytes);
@@ -144,6 +145,14 @@ pub(super) fn embedded(data: &str) -> Result<(&str, Vec<u8>), String> {
         .ok_or_else(|| format!("has the uri `data:{}`, which is not base64", shown(data.as_bytes())))?;
     let bytes = BASE64.decode(encoded).map_err(|error| format!("is no valid base64: {error}"))?;
     Ok((media_type, bytes))
+}
+
+/// A uri that holds bytes, of the media type that uri `like` states if it holds some.
+pub(super) fn embedding(bytes: &[u8], like: &str) -> String {
+    let stated =
+        like.split_once(";base64,").map(|(start, _)| start).filter(|start| start.starts_with("data:"));
+    let start = stated.unwrap_or("data:application/octet-stream");
+    format!("{start};base64,{}", BASE64.encode(bytes))
 }
 
 /// A uri's file name, its `%20` and the like made plain.

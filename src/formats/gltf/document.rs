@@ -86,6 +86,8 @@ fn triangles() -> u32 {
 pub(super) struct Attributes {
     #[serde(rename = "POSITION")]
     pub position: Option<usize>,
+    #[serde(rename = "NORMAL")]
+    pub normal: Option<usize>,
     #[serde(rename = "COLOR_0")]
     pub colour: Option<usize>,
     #[serde(rename = "TEXCOORD_0")]
@@ -282,6 +284,16 @@ impl<'a> Document<'a> {
 
     pub fn buffer_view(&self, index: usize) -> Result<BufferView<'a>, Fault> {
         self.entry(&self.buffer_views, "bufferViews", index)
+    }
+
+    /// The text of an accessor's entry.
+    pub fn accessor_text(&self, index: usize) -> Option<&'a RawValue> {
+        self.accessors.get(index).copied()
+    }
+
+    /// The text of a buffer's entry.
+    pub fn buffer_text(&self, index: usize) -> Option<&'a RawValue> {
+        self.buffers.get(index).copied()
     }
 
     pub fn material(&self, index: usize) -> Result<Material, Fault> {

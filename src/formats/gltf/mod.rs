@@ -7,6 +7,7 @@ mod buffer;
 mod container;
 mod document;
 mod image;
+mod rewriter;
 mod scene;
 mod surface;
 #[cfg(test)]
@@ -22,6 +23,7 @@ use super::weld::weld;
 use buffer::Buffers;
 use container::Container;
 use document::Document;
+pub(super) use rewriter::{embed, rewrite};
 
 /// The `extras` of the default scene of a glTF or GLB, if it is one and has any.
 pub fn scene_extras(bytes: &[u8]) -> Option<Value> {
@@ -37,7 +39,7 @@ pub(super) fn read(bytes: &[u8], siblings: &Siblings) -> Result<Geometry, Fault>
     let container = Container::split(bytes)?;
     let document = Document::parse(container.json)?;
     let buffers = Buffers::new(&document, container.binary, siblings, bytes.len());
-    let geometry = scene::gather(&buffers)?;
+    let geometry = scene::gather(&buffers)?.geometry;
     // What this program wrote has no seams, and its vertex order is what it is kept for.
     let own = document.asset()?.generator.is_some_and(|name| name.starts_with(glb::PROGRAM));
     Ok(if own { geometry } else { weld(geometry) })

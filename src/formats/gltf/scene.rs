@@ -1,4 +1,4 @@
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 
 use glam::{DMat4, DQuat, DVec3};
 
@@ -9,13 +9,31 @@ use super::surface::Surface;
 use crate::formats::error::Fault;
 use crate::formats::geometry::Geometry;
 
-/// The triangles of the default scene, in its space. A file without nodes has its meshes as they are.
-pub(super) fn gather(buffers: &Buffers) -> Result<Geometry, Fault> {
+/// The triangles of a scene, in its space, and where their vertices stand in the file.
+pub(super) struct Scene {
+    pub geometry: Geometry,
+    pub places: Vec<Place>,
+}
+
+/// An accessor's positions among the scene's vertices.
+pub(super) struct Place {
+    pub accessor: usize,
+    /// To the scene.
+    pub transform: DMat4,
+    pub first: u32,
+    pub count: u32,
+    /// The accessors that hold normals of the same vertices.
+    pub normals: BTreeSet<usize>,
+}
+
+/// The default scene. A file without nodes has its meshes as they are.
+pub(super) fn gather(buffers: &Buffers) -> Result<Scene, Fault> {
     let document = buffers.document();
     let mut gathered = Gathered {
         buffers,
         geometry: Geometry::default(),
         surface: Surface::new(buffers),
+        places: Vec::new(),
         placed: HashMap::new(),
         others: 0,
     };
@@ -29,16 +47,17 @@ pub(super) fn gather(buffers: &Buffers) -> Result<Geometry, Fault> {
         return Err(Fault::at("the default scene", problem));
     }
     gathered.surface.finish(&mut gathered.geometry);
-    Ok(gathered.geometry)
+    Ok(Scene { geometry: gathered.geometry, places: gathered.places })
 }
 
 struct Gathered<'g, 'a> {
     buffers: &'g Buffers<'a>,
     geometry: Geometry,
     surface: Surface<'g, 'a>,
-    /// First vertex and number of vertices of each accessor under each transform: primitives and meshes often share
-    /// their vertices and differ in their indices.
-    placed: HashMap<(usize, [u64; 16]), (u32, u32)>,
+    places: Vec<Place>,
+    /// The place of each accessor under each transform: primitives and meshes often share their vertices and differ in
+    /// their indices.
+    placed: HashMap<(usize, [u64; 16]), usize>,
     /// Primitives that are no triangles.
     others: usize,
 }
@@ -97,15 +116,19 @@ impl Gathered<'_, '_> {
             let accessor =
                 position.ok_or_else(|| Fault::at(&place, "has no POSITION: its vertices are lost"))?;
             let key = (accessor, transform.to_cols_array().map(f64::to_bits));
-            let range = match self.placed.get(&key) {
-                Some(&range) => range,
+            let placed = match self.placed.get(&key) {
+                Some(&placed) => placed,
                 None => {
-                    let range = self.vertices(accessor, transform)?;
-                    self.surface.vertices(range, primitive.attributes.colour);
-                    range
+                    let (first, count) = self.vertices(accessor, transform)?;
+                    self.surface.vertices((first, count), primitive.attributes.colour);
+                    self.places.push(Place { accessor, transform, first, count, normals: BTreeSet::new() });
+                    self.places.len() - 1
                 }
             };
-            self.placed.insert(key, range);
+            self.placed.insert(key, placed);
+            let place_of = &mut self.places[placed];
+            place_of.normals.extend(primitive.attributes.normal);
+            let range = (place_of.first, place_of.count);
             self.primitive(primitive, range, transform.determinant() < 0.0, &place)?;
         }
         Ok(())

@@ -1,12 +1,14 @@
 //! Wavefront OBJ: the statements `v`, `vt`, `f`, `usemtl` and `mtllib`; all groups and objects are one mesh.
 
 mod material;
+mod rewriter;
 mod surface;
 #[cfg(test)]
 mod tests;
 mod writer;
 
-pub use writer::{obj_bytes, write_obj};
+pub(super) use rewriter::rewrite;
+pub use writer::{Obj, obj_bytes, write_obj};
 
 use glam::DVec3;
 

@@ -5,12 +5,14 @@ mod binary;
 mod body;
 mod faces;
 mod header;
+mod rewriter;
 #[cfg(test)]
 mod tests;
 mod vertices;
 mod writer;
 
-pub use writer::{ply_bytes, write_ply};
+pub(super) use rewriter::rewrite;
+pub use writer::{Ply, ply_bytes, write_ply};
 
 use super::error::Fault;
 use super::geometry::Geometry;
