@@ -1,6 +1,6 @@
 # Works from a fresh checkout on Debian: what is missing is installed first, as root or by sudo.
 
-.PHONY: demo test bench licences rust validator
+.PHONY: demo test bench licences templates rust validator
 
 # The demo collection, registered: meshes, report and picture.
 demo: rust
@@ -13,6 +13,11 @@ test: rust validator
 # How long each stage and kernel takes.
 bench: rust
 	cargo run --release --locked -- bench
+
+# The head that comes with the program, from the sphere and from other heads than the demo's.
+templates: rust
+	cargo run --release --locked -- demo --seed 7 --count 12 --set from_head=false -o target/head
+	cp target/head/result/template.frozen.glb templates/head68.glb
 
 # Whether every dependency's licence leaves users the choice of ours.
 licences: rust
