@@ -71,7 +71,7 @@ fn a_collection_is_registered() {
     }
     assert_eq!(manifest["settings"]["groupwise"]["rounds"], 1);
     assert_eq!(manifest["template"]["vertices"], 642);
-    assert!(report["seconds"]["register"].is_number() && report["seconds"]["write"].is_number());
+    assert!(report["seconds"]["groupwise"].is_number() && report["seconds"]["write"].is_number());
     assert!(fs::read(out.join("sheet.png")).unwrap().starts_with(b"\x89PNG"));
     let unfinished = fs::read_dir(&out)
         .unwrap()
