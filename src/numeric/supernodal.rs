@@ -7,8 +7,6 @@ use super::Dissection;
 
 /// Rows handled at once: one AVX register, two SSE registers; fixed, so that sums do not depend on the processor.
 const LANES: usize = 8;
-/// Columns of a block that backward substitution takes at once: their sums and the vectors fill the registers.
-const COLUMNS: usize = 4;
 
 /// A lower-triangular factor L by columns, row indices ascending, the diagonal first.
 pub struct ColumnFactor<'a> {
@@ -262,30 +260,6 @@ fn add_product(sum: &mut Lanes, a: &Lanes, b: &Lanes) {
     }
 }
 
-/// The products of columns `first..first + C` of a block with three vectors as tall; `values` holds these columns alone.
-#[inline(always)]
-fn column_products<const C: usize>(values: &[f32], first: usize, dense: [&[f32]; 3]) -> [Vec3A; C] {
-    let height = values.len() / C;
-    let mut sums = [[[0.0; LANES]; 3]; C];
-    // Above its diagonal a column is zero.
-    for start in (first / LANES * LANES..height).step_by(LANES) {
-        let dense = dense.map(|dense| lanes(&dense[start..]));
-        for (k, sums) in sums.iter_mut().enumerate() {
-            let values = lanes(&values[k * height + start..]);
-            for (sum, dense) in sums.iter_mut().zip(dense) {
-                add_product(sum, values, dense);
-            }
-        }
-    }
-    sums.map(|sums| Vec3A::from_array(sums.map(|sum| total(&sum))))
-}
-
-#[inline(always)]
-fn total(sum: &Lanes) -> f32 {
-    let half: [f32; LANES / 2] = std::array::from_fn(|lane| sum[lane] + sum[lane + LANES / 2]);
-    (half[0] + half[2]) + (half[1] + half[3])
-}
-
 /// L y = b, block after block: y_J = D b_J, then b -= (B D) b_J below.
 #[multiversion(targets("x86_64+avx2"))]
 fn forward(blocks: &[Block], rows: &[u32], values: &[f32], x: &mut [Vec3A], dense: &mut [f32]) {
@@ -333,19 +307,15 @@ fn backward(blocks: &[Block], rows: &[u32], values: &[f32], x: &mut [Vec3A], den
             dense_y[i] = value.y;
             dense_z[i] = value.z;
         }
-        let x_of = &mut x[column..column + width];
-        let dense = [&*dense_x, &*dense_y, &*dense_z];
-        let mut together = values.chunks_exact(COLUMNS * height);
-        let mut at = 0;
-        for values in &mut together {
-            for x in column_products::<COLUMNS>(values, at, dense) {
-                x_of[at] = x;
-                at += 1;
+        for (k, values) in values.chunks_exact(height).enumerate() {
+            let mut sum = [[0.0; LANES]; 3];
+            for start in (k / LANES * LANES..height).step_by(LANES) {
+                let values = lanes(&values[start..]);
+                add_product(&mut sum[0], values, lanes(&dense_x[start..]));
+                add_product(&mut sum[1], values, lanes(&dense_y[start..]));
+                add_product(&mut sum[2], values, lanes(&dense_z[start..]));
             }
-        }
-        for values in together.remainder().chunks_exact(height) {
-            [x_of[at]] = column_products::<1>(values, at, dense);
-            at += 1;
+            x[column + k] = Vec3A::from_array(sum.map(|sum| sum.iter().sum()));
         }
     }
 }
