@@ -1,5 +1,6 @@
 //! Triangle meshes, the landmarks on them, and the template spheres. Layer 0: imports nothing of this crate.
 
+mod component;
 mod edge_length;
 mod icosphere;
 mod landmark;
@@ -9,6 +10,7 @@ mod sphere_layout;
 mod topology;
 mod triangle_mesh;
 
+pub use component::components;
 pub use edge_length::{mean_edge_lengths, pull_back_mean_edge_lengths};
 pub use icosphere::{Icosphere, Midpoints};
 pub use landmark::{LandmarkSet, SurfacePoint, interpolate};

@@ -7,7 +7,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::template::Template;
-use crate::mesh::SurfacePoint;
+use crate::mesh::{SurfacePoint, components};
 use crate::numeric::Similarity;
 
 /// A template taken apart.
@@ -23,7 +23,7 @@ pub(super) struct Parts<'a> {
 
 impl<'a> Parts<'a> {
     pub fn of(whole: &'a Template) -> Self {
-        let component = components(whole);
+        let component = components_with_triangles(whole);
         let landmark_on = |at: &SurfacePoint| component[whole.triangles[at.triangle.0 as usize][0] as usize];
         let mut is_main = vec![whole.landmarks.is_empty(); whole.positions.len() + 1];
         whole.landmarks.values().for_each(|at| is_main[landmark_on(at) as usize] = true);
@@ -81,30 +81,13 @@ impl<'a> Parts<'a> {
 }
 
 /// The component of each vertex `[N]`, called by a vertex of it; N for vertices without a triangle.
-fn components(template: &Template) -> Vec<u32> {
+fn components_with_triangles(template: &Template) -> Vec<u32> {
     let vertices = template.positions.len();
-    let mut parent: Vec<u32> = (0..vertices as u32).collect();
     let mut has_triangle = vec![false; vertices];
-    for &[a, b, c] in &template.triangles {
-        for other in [b, c] {
-            let (one, other) = (root(&mut parent, a), root(&mut parent, other));
-            parent[one.max(other) as usize] = one.min(other);
-        }
-        [a, b, c].iter().for_each(|&corner| has_triangle[corner as usize] = true);
-    }
-    let called =
-        |vertex: usize| if has_triangle[vertex] { root(&mut parent, vertex as u32) } else { vertices as u32 };
-    (0..vertices).map(called).collect()
-}
-
-/// The first vertex of a component, paths to it halved on the way.
-fn root(parent: &mut [u32], mut vertex: u32) -> u32 {
-    while parent[vertex as usize] != vertex {
-        let above = parent[parent[vertex as usize] as usize];
-        parent[vertex as usize] = above;
-        vertex = above;
-    }
-    vertex
+    template.triangles.iter().flatten().for_each(|&corner| has_triangle[corner as usize] = true);
+    let components = components(vertices, &template.triangles);
+    let called = |(component, has)| if has { component } else { vertices as u32 };
+    components.into_iter().zip(has_triangle).map(called).collect()
 }
 
 /// The part of a template that has these vertices, ascending: whole components, and those of all landmarks.

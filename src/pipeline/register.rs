@@ -212,7 +212,8 @@ impl Run<'_> {
     fn timed<T>(&mut self, stage: Stage, work: impl FnOnce(&Self) -> T) -> T {
         let start = Instant::now();
         let result = work(self);
-        self.seconds.insert(stage, start.elapsed().as_secs_f64());
+        // A stage may have several parts.
+        *self.seconds.entry(stage).or_default() += start.elapsed().as_secs_f64();
         result
     }
 

@@ -1,6 +1,6 @@
 use glam::{DVec3, Vec3A};
 
-use crate::mesh::{MeshError, TriangleMesh};
+use crate::mesh::{MeshError, TriangleMesh, components};
 use crate::spatial::SurfaceIndex;
 
 /// Pieces at least this large, of the largest one's area, are parts of the scan wherever they lie.
@@ -16,7 +16,7 @@ const NEAR: f32 = 0.05;
 /// # Errors
 /// [`MeshError`] where what is left is no mesh.
 pub fn without_strays(mesh: &TriangleMesh) -> Result<Option<(TriangleMesh, Vec<u32>)>, MeshError> {
-    let pieces = pieces(mesh);
+    let pieces = components(mesh.positions().len(), mesh.triangles());
     let areas = areas(mesh, &pieces);
     let largest = areas.iter().copied().fold(0.0, f64::max);
     let is_part = |t: usize| areas[pieces[mesh.triangles()[t][0] as usize] as usize] >= PART * largest;
@@ -32,25 +32,6 @@ pub fn without_strays(mesh: &TriangleMesh) -> Result<Option<(TriangleMesh, Vec<u
         .copied()
         .collect();
     if kept.len() == mesh.triangles().len() { Ok(None) } else { compact(mesh, &kept).map(Some) }
-}
-
-/// The piece of each vertex `[N]`, named by its smallest vertex: what edges join is one piece.
-fn pieces(mesh: &TriangleMesh) -> Vec<u32> {
-    let mut parent: Vec<u32> = (0..mesh.positions().len() as u32).collect();
-    fn root(parent: &mut [u32], mut i: u32) -> u32 {
-        while parent[i as usize] != i {
-            parent[i as usize] = parent[parent[i as usize] as usize];
-            i = parent[i as usize];
-        }
-        i
-    }
-    for &[a, b, c] in mesh.triangles() {
-        for (i, j) in [(a, b), (a, c)] {
-            let (i, j) = (root(&mut parent, i), root(&mut parent, j));
-            parent[i.max(j) as usize] = i.min(j);
-        }
-    }
-    (0..parent.len() as u32).map(|i| root(&mut parent, i)).collect()
 }
 
 /// The area of each piece, at its name.
