@@ -123,7 +123,7 @@ fn level(level: u32, iterations: usize) -> LevelSettings {
 fn groupwise() -> GroupwiseSettings {
     GroupwiseSettings {
         rounds: 2,
-        curvature_power: 0.5,
+        curvature_power: 0.67,
         need_smoothing: 2.0,
         most_need: 10.0,
         phases: 12,

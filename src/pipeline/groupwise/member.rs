@@ -5,6 +5,7 @@ use rayon::prelude::*;
 
 use super::RestShape;
 use super::film::fall;
+use super::unfold::unfold;
 use crate::energy::LandmarkPull;
 use crate::mesh::{Normals, interpolate};
 use crate::numeric::{SolveBuffer, SparseCholesky, SymmetricMatrix};
@@ -63,7 +64,9 @@ pub fn register_member(
             watch.step(first_iteration + phase * settings.iterations + iteration + 1, distance)?;
         }
     }
-    Ok(registration.p)
+    let mut p = registration.p;
+    unfold(&rest.connectivity, registration.scan, &mut p);
+    Ok(p)
 }
 
 /// A parameter that changes by the same factor from phase to phase; evenly where an end is zero and there is no factor.
