@@ -127,7 +127,7 @@ fn groupwise() -> GroupwiseSettings {
         need_smoothing: 2.0,
         most_need: 10.0,
         phases: 12,
-        iterations: 5,
+        iterations: 8,
         stiffness: [1000.0, 0.05],
         smoothing: [1000.0, 1.0],
         landmark_weight: 60.0,

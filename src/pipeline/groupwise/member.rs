@@ -14,7 +14,7 @@ use crate::pipeline::{GroupwiseSettings, ScanSurface, SurfaceSample};
 use crate::spatial::{Hit, SurfaceIndex};
 
 /// The system is factored anew after this many iterations; in between it is a good preconditioner.
-const FACTOR_EVERY: usize = 5;
+const FACTOR_EVERY: usize = 4;
 
 /// Weight that keeps a vertex without data where it is.
 const INERTIA: f64 = 0.1;
