@@ -304,9 +304,11 @@ fn results_are_in_the_template_s_own_file() {
     let head = read_mesh(scans.join(&names[0]).join("scan.ply")).unwrap();
     let text =
         String::from_utf8(obj_bytes(&head)).unwrap().replacen("f ", "# by hand\ng face\nusemtl skin\nf ", 1);
-    let text = format!("mtllib own.mtl\n{text}");
+    let face = text.lines().find(|line| line.starts_with("f ")).unwrap();
+    let textured = face.replace(' ', "/1 ").replacen("f/1", "f", 1) + "/1";
+    let text = format!("mtllib own.mtl\nvt 0 0\n{}", text.replacen(face, &textured, 1));
     fs::write(&template, &text).unwrap();
-    fs::write(folder.path().join("own.mtl"), "newmtl skin\nKd 1 0.8 0.7\n").unwrap();
+    fs::write(folder.path().join("own.mtl"), "newmtl skin\nmap_Kd skin.png\n").unwrap();
     fs::copy(scans.join(&names[0]).join("landmarks.json"), folder.path().join("own.landmarks.json")).unwrap();
     let register = |more: &[&str]| {
         let fixed =

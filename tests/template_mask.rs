@@ -44,10 +44,11 @@ fn a_masked_part_follows_its_surroundings() {
     let whole = registered(&template, &subject);
     let lump = height(&whole, &template, &inside);
     template.mask = Some(vec![1.0; inside.len()]);
-    assert_eq!(registered(&template, &subject).members, whole.members, "a mask of ones changes nothing");
+    assert!(registered(&template, &subject).members == whole.members, "a mask of ones changes nothing");
     template.mask = Some(inside.iter().map(|&inside| if inside { 0.0 } else { 1.0 }).collect());
     let masked = registered(&template, &subject);
-    assert!(height(&masked, &template, &inside) < 0.3 * lump);
+    let left = height(&masked, &template, &inside);
+    assert!(left < 0.3 * lump, "{left} of {lump}");
     for (&inside, &known) in inside.iter().zip(&masked.confidence[0]) {
         assert!(!inside || known == 0.0, "what is masked is not known");
     }

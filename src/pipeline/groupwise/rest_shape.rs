@@ -48,6 +48,7 @@ impl RestShape {
 
     /// The same whose vertices take as much of the scans' data as `mask` `[N]` says, 0 to 1.
     pub fn masked(self, mask: Option<&[f32]>) -> Self {
+        let mask = mask.filter(|mask| mask.iter().any(|taken| *taken != 1.0));
         Self { mask: mask.map(<[f32]>::to_vec), ..self }
     }
 
