@@ -1,6 +1,6 @@
 # Works from a fresh checkout on Debian: what is missing is installed first, as root or by sudo.
 
-.PHONY: demo test bench licences templates rust validator
+.PHONY: demo test bench licences templates pictures rust validator
 
 # The demo collection, registered: meshes, report and picture.
 demo: rust
@@ -18,6 +18,10 @@ bench: rust
 templates: rust
 	cargo run --release --locked -- demo --seed 7 --count 12 --set from_head=false -o target/head
 	cp target/head/result/template.frozen.glb templates/head68.glb
+
+# The README's pictures of what else goes in.
+pictures: rust
+	cargo run --release --locked --example pictures
 
 # Whether every dependency's licence leaves users the choice of ours.
 licences: rust

@@ -9,6 +9,8 @@ mod frozen;
 mod groupwise;
 mod head;
 mod known;
+mod landmark_weights;
+mod laying;
 mod manifest;
 mod mask;
 mod matching;

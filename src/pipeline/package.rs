@@ -24,11 +24,13 @@ use crate::mesh::{MeshError, TriangleMesh};
 use crate::picture::PictureError;
 
 /// Version of manifest and report.
-const RECORD: u32 = 1;
+const RECORD: u32 = 2;
 const MANIFEST: &str = "manifest.json";
 const REPORT: &str = "report.json";
 const SHEET: &str = "sheet.png";
 const TEMPLATE: &str = "template.frozen.glb";
+/// The files that are not of one scan.
+const OWN: [&str; 4] = [MANIFEST, REPORT, SHEET, TEMPLATE];
 
 /// A registered collection on its way to disk.
 #[derive(Debug, Clone)]
@@ -69,6 +71,19 @@ pub enum PackageError {
     Overwrites {
         /// The file.
         path: PathBuf,
+    },
+    /// A file that the template names cannot lie beside the results.
+    #[error(
+        "{}: is named by the template, and cannot be copied to {}: {problem}; or leave `template` out of --format",
+        path.display(), to.display()
+    )]
+    Companion {
+        /// The file.
+        path: PathBuf,
+        /// Where it should be.
+        to: PathBuf,
+        /// Why not.
+        problem: String,
     },
     /// A result is no mesh.
     #[error("the result of scan `{name}` cannot be kept: {error}")]
@@ -114,6 +129,7 @@ impl Package<'_> {
                 Ok((report, outputs))
             })
             .collect::<Result<Vec<_>, PackageError>>()?;
+        self.copy_companions(folder)?;
         let Registration { template, .. } = self.registration;
         let frozen = FrozenCollection { template: template.clone(), settings: self.settings.clone() };
         write_whole(folder.join(TEMPLATE), &frozen.glb_bytes()?)?;
@@ -158,6 +174,27 @@ impl Package<'_> {
             Ok(OutputEntry { file, sha256: Sha256::of(&bytes) })
         };
         self.outputs.files(&subject.name).into_iter().map(write).collect()
+    }
+
+    /// Copies what results in the template's own format name to where they look for it; what is there already stays.
+    fn copy_companions(&self, folder: &Path) -> Result<(), PackageError> {
+        for (name, path) in self.outputs.companions() {
+            let to = folder.join(&name);
+            let failed =
+                |problem: String| PackageError::Companion { path: path.clone(), to: to.clone(), problem };
+            if is_same(&path, &to) {
+                continue;
+            }
+            let results = self.subjects.iter().flat_map(|subject| self.outputs.files(&subject.name));
+            let results = results.map(|(_, file)| file).chain(OWN.map(str::to_owned));
+            if results.map(PathBuf::from).any(|file| file == name) {
+                return Err(failed("a result has that name: rename it, and in the template".to_owned()));
+            }
+            let made = to.parent().map_or(Ok(()), fs::create_dir_all);
+            let bytes = made.and_then(|()| fs::read(&path)).map_err(|error| failed(error.to_string()))?;
+            write_whole(&to, &bytes)?;
+        }
+        Ok(())
     }
 
     /// The template's landmarks on a result, as landmark files have them and with their places on the triangles.
@@ -209,14 +246,22 @@ pub fn spare_inputs(
     outputs: &Outputs,
 ) -> Result<(), PackageError> {
     let template = outputs.source.map_or(&[][..], |source| &source.inputs);
+    let copied = outputs.companions();
     let outputs = subjects.iter().flat_map(|subject| outputs.files(&subject.name)).map(|(_, file)| file);
-    let outputs = outputs.chain([MANIFEST, REPORT, SHEET, TEMPLATE].map(str::to_owned));
-    let outputs: Vec<PathBuf> = outputs.filter_map(|name| fs::canonicalize(folder.join(name)).ok()).collect();
+    let outputs = outputs.chain(OWN.map(str::to_owned)).map(|name| folder.join(name));
+    let copies = copied.iter().map(|(name, path)| (folder.join(name), path));
+    let copies = copies.filter(|(to, path)| !is_same(path, to)).map(|(to, _)| to);
+    let outputs: Vec<PathBuf> =
+        outputs.chain(copies).filter_map(|path| fs::canonicalize(path).ok()).collect();
     let is_output = |input: &&InputFile| fs::canonicalize(&input.path).is_ok_and(|at| outputs.contains(&at));
     match inputs.iter().flatten().chain(template).find(is_output) {
         Some(input) => Err(PackageError::Overwrites { path: input.path.clone() }),
         None => Ok(()),
     }
+}
+
+fn is_same(one: &Path, other: &Path) -> bool {
+    matches!((fs::canonicalize(one), fs::canonicalize(other)), (Ok(one), Ok(other)) if one == other)
 }
 
 fn program() -> String {

@@ -11,6 +11,8 @@ use super::fit::{SphereLandmark, fit};
 use super::groupwise::{Member, RestShape, SharedMesh, close_smoothly, mean_shape, register_member};
 use super::head::{self, head};
 use super::known::{known, unknown};
+use super::landmark_weights::LandmarkWeights;
+use super::laying::laid;
 use super::mask::{MaskError, check_mask};
 use super::observer::{Canceled, Observer, Stage, Watch};
 use super::resample;
@@ -95,6 +97,9 @@ pub enum RegisterError {
         /// What is wrong with it.
         error: MaskError,
     },
+    /// A mask of the template that is none.
+    #[error("the template's mask {0}")]
+    TemplateMask(MaskError),
     /// Stopped on request.
     #[error(transparent)]
     Canceled(#[from] Canceled),
@@ -198,6 +203,8 @@ struct Prepared<'a> {
     name: &'a str,
     scan: ScanSurface,
     landmarks: Vec<Vec3A>,
+    /// How much each of them counts.
+    weights: Vec<f64>,
 }
 
 struct Run<'a> {
@@ -237,11 +244,10 @@ impl Run<'_> {
                 interpolate(&head, corners, at.weights.map(|w| w as f32)).as_dvec3()
             })
             .collect();
-        let equal = vec![1.0; on_head.len()];
+        let head: Vec<DVec3> = head.iter().map(|p| p.as_dvec3()).collect();
         let lay = |member: &Prepared| {
             let targets: Vec<DVec3> = member.landmarks.iter().map(|p| p.as_dvec3()).collect();
-            let similarity = Similarity::between(&on_head, &targets, &equal);
-            head.iter().map(|p| similarity.apply(p.as_dvec3()).as_vec3a()).collect()
+            laid(&head, &on_head, &targets, &member.weights)
         };
         SharedMesh { shapes: members.iter().map(lay).collect(), sphere, points, mean: Vec::new() }
     }
@@ -263,15 +269,16 @@ impl Run<'_> {
             self.names.iter().filter_map(|name| subject.landmarks.get(name)).collect()
         };
         let Some(first) = subjects.first().map(landmarks) else { return Vec::new() };
-        let equal = vec![1.0; first.len()];
-        let prepare = |subject: &'s Subject| {
+        let counted = LandmarkWeights::of(subjects, self.settings);
+        let prepare = |(number, subject): (usize, &'s Subject)| {
             let own = landmarks(subject);
-            let rotation = Similarity::between(&own, &first, &equal).rotation;
+            let weights = counted.on(number, &self.names);
+            let rotation = Similarity::between(&own, &first, &weights).rotation;
             let scan = ScanSurface::weighted(&subject.mesh, subject.mask.as_deref(), rotation, SAMPLES);
             let landmarks = own.iter().map(|&p| scan.to_unit(p)).collect();
-            Prepared { name: &subject.name, scan, landmarks }
+            Prepared { name: &subject.name, scan, landmarks, weights }
         };
-        subjects.par_iter().map(prepare).collect()
+        subjects.par_iter().enumerate().map(prepare).collect()
     }
 
     fn fit_all(
@@ -285,8 +292,8 @@ impl Run<'_> {
         let one = |member: &Prepared| {
             let landmarks: Vec<SphereLandmark> = on_sphere
                 .iter()
-                .zip(&member.landmarks)
-                .map(|(&on_sphere, &target)| SphereLandmark { on_sphere, target })
+                .zip(member.landmarks.iter().zip(&member.weights))
+                .map(|(&on_sphere, (&target, &weight))| SphereLandmark { on_sphere, target, weight })
                 .collect();
             let watch = Watch { observer: self.observer, stage, scan: member.name, iterations };
             fit(&member.scan, settings, &landmarks, &watch)
@@ -340,7 +347,7 @@ impl Run<'_> {
                     scan: member.name,
                     iterations: per_round * settings.rounds,
                 };
-                let pulls = pulls(&shared.points, &member.landmarks);
+                let pulls = pulls(&shared.points, member);
                 let start = moved_onto(&rest.positions, shape, known);
                 let member = Member { scan: &member.scan, landmarks: &pulls, start };
                 register_member(&rest, member, settings, &watch, round * per_round)
@@ -352,8 +359,13 @@ impl Run<'_> {
     }
 }
 
-fn pulls(points: &[SurfacePoint], targets: &[Vec3A]) -> Vec<LandmarkPull> {
-    points.iter().zip(targets).map(|(point, &target)| LandmarkPull::new(point, target)).collect()
+fn pulls(points: &[SurfacePoint], member: &Prepared) -> Vec<LandmarkPull> {
+    let targets = member.landmarks.iter().zip(&member.weights);
+    let pull = |(point, (&target, &weight))| LandmarkPull {
+        weight: weight as f32,
+        ..LandmarkPull::new(point, target)
+    };
+    points.iter().zip(targets).map(pull).collect()
 }
 
 /// A shape moved onto another of the same vertices by a similarity, with a weight for each vertex.

@@ -12,6 +12,9 @@ use super::confidence::confidence;
 use super::connectivity::Connectivity;
 use super::groupwise::{Member, RestShape, mean_shape, register_member};
 use super::known::known;
+use super::landmark_weights::LandmarkWeights;
+use super::laying::laid;
+use super::mask::check_mask;
 use super::observer::{Observer, Stage, Watch};
 use super::register::{
     LEAST_LANDMARKS, RegisterError, Registration, SAMPLES, Subject, check_masks, moved_onto,
@@ -44,6 +47,8 @@ pub fn register_to(
         return Err(RegisterError::Empty);
     }
     check_masks(subjects)?;
+    let mask = template.mask.as_ref().map_or(Ok(()), |mask| check_mask(mask, template.positions.len()));
+    mask.map_err(RegisterError::TemplateMask)?;
     let start = Instant::now();
     let parts = Parts::of(template);
     let mut registration = register_main(&parts.main, subjects, settings, observer)?;
@@ -64,8 +69,9 @@ fn register_main(
 ) -> Result<Registration, RegisterError> {
     let rest: Vec<Vec3A> = template.positions.iter().map(|p| p.as_vec3a()).collect();
     let connectivity = Arc::new(Connectivity::new(&rest, &template.triangles));
-    let members: Vec<Laid> =
-        subjects.par_iter().map(|subject| Laid::of(template, subject)).collect::<Result<_, _>>()?;
+    let weights = LandmarkWeights::of(subjects, settings);
+    let lay = |(number, subject)| Laid::of(template, subject, |names: &[&str]| weights.on(number, names));
+    let members: Vec<Laid> = subjects.par_iter().enumerate().map(lay).collect::<Result<_, _>>()?;
     let scans: Vec<&ScanSurface> = members.iter().map(|member| &member.scan).collect();
     let settings = &settings.transfer;
     let rounds = if template.frozen || subjects.len() == 1 { 1 } else { settings.rounds.max(1) };
@@ -83,14 +89,20 @@ fn register_main(
         let one = |(member, start): (&Laid, Vec<Vec3A>)| {
             let iterations = per_round * rounds;
             let watch = Watch { observer, stage: Stage::Register, scan: member.name, iterations };
-            let rest = RestShape::new(connectivity.clone(), start.clone());
+            let rest = RestShape::new(connectivity.clone(), start.clone()).masked(template.mask.as_deref());
             let member = Member { scan: &member.scan, landmarks: &member.pulls, start };
             register_member(&rest, member, settings, &watch, round * per_round)
         };
         shapes = members.par_iter().zip(shapes).map(one).collect::<Result<_, _>>()?;
     }
     let confidence = (scans.par_iter().zip(&shapes))
-        .map(|(scan, shape)| confidence(scan, &connectivity.topology, shape))
+        .map(|(scan, shape)| {
+            let mut confidence = confidence(scan, &connectivity.topology, shape);
+            for (confidence, taken) in confidence.iter_mut().zip(template.mask.iter().flatten()) {
+                *confidence *= taken;
+            }
+            confidence
+        })
         .collect();
     let back = |(member, shape): (&Laid, Vec<Vec3A>)| shape.iter().map(|p| member.scan.to_scan(*p)).collect();
     let members = members.iter().zip(shapes).map(back).collect();
@@ -107,29 +119,43 @@ struct Laid<'a> {
 }
 
 impl<'a> Laid<'a> {
-    fn of(template: &Template, subject: &'a Subject) -> Result<Self, RegisterError> {
+    /// Lays the template on a scan by the landmarks that both have, which count as `weights` says of their names.
+    fn of(
+        template: &Template,
+        subject: &'a Subject,
+        weights: impl FnOnce(&[&str]) -> Vec<f64>,
+    ) -> Result<Self, RegisterError> {
         let common = common_landmarks(template, subject)?;
-        let (own, theirs): (Vec<DVec3>, Vec<DVec3>) =
-            common.iter().map(|(at, target)| (template.point(&template.positions, at), *target)).unzip();
-        let equal = vec![1.0; common.len()];
-        let rotation = Similarity::between(&theirs, &own, &equal).rotation;
+        let weights = weights(&common.iter().map(|common| common.name).collect::<Vec<_>>());
+        let own: Vec<DVec3> =
+            common.iter().map(|common| template.point(&template.positions, common.at)).collect();
+        let theirs: Vec<DVec3> = common.iter().map(|common| common.target).collect();
+        let rotation = Similarity::between(&theirs, &own, &weights).rotation;
         let scan = ScanSurface::weighted(&subject.mesh, subject.mask.as_deref(), rotation, SAMPLES);
         let targets: Vec<DVec3> = theirs.iter().map(|&p| scan.to_unit(p).as_dvec3()).collect();
-        let laid = Similarity::between(&own, &targets, &equal);
-        let start = template.positions.iter().map(|&p| laid.apply(p).as_vec3a()).collect();
-        let pull =
-            |((at, _), target): (&(&SurfacePoint, DVec3), &DVec3)| LandmarkPull::new(at, target.as_vec3a());
-        let pulls = common.iter().zip(&targets).map(pull).collect();
+        let start = laid(&template.positions, &own, &targets, &weights);
+        let pull = |((common, target), &weight): ((&Common, &DVec3), &f64)| LandmarkPull {
+            weight: weight as f32,
+            ..LandmarkPull::new(common.at, target.as_vec3a())
+        };
+        let pulls = common.iter().zip(&targets).zip(&weights).map(pull).collect();
         Ok(Self { name: &subject.name, scan, pulls, start })
     }
 }
 
-/// Where each landmark that both have lies on the template and on the scan.
-fn common_landmarks<'a>(
-    template: &'a Template,
-    subject: &Subject,
-) -> Result<Vec<(&'a SurfacePoint, DVec3)>, RegisterError> {
-    let on_both = |(name, at): (&String, &'a SurfacePoint)| Some((at, subject.landmarks.get(name)?));
+/// A landmark that template and scan have.
+struct Common<'t> {
+    name: &'t str,
+    /// Its place on the template.
+    at: &'t SurfacePoint,
+    /// Its position on the scan, in the scan's space.
+    target: DVec3,
+}
+
+fn common_landmarks<'t>(template: &'t Template, subject: &Subject) -> Result<Vec<Common<'t>>, RegisterError> {
+    let on_both = |(name, at): (&'t String, &'t SurfacePoint)| {
+        Some(Common { name, at, target: subject.landmarks.get(name)? })
+    };
     let common: Vec<_> = template.landmarks.iter().filter_map(on_both).collect();
     if common.len() < LEAST_LANDMARKS {
         return Err(RegisterError::TooFewForTemplate { scan: subject.name.clone(), found: common.len() });
