@@ -109,7 +109,8 @@ mod tests {
     #[test]
     fn it_stays_within_its_bytes_and_forgets_what_was_used_least_recently() {
         let mesh = TriangleMesh::new(vec![DVec3::ZERO, DVec3::X, DVec3::Y], vec![[0, 1, 2]]).unwrap();
-        let subject = Arc::new(Subject { name: "a".into(), mesh, landmarks: LandmarkSet::default(), mask: None });
+        let subject =
+            Arc::new(Subject { name: "a".into(), mesh, landmarks: LandmarkSet::default(), mask: None });
         let key = |name: &str| Key { scan: name.to_owned(), plan: None };
         // One is 84 bytes.
         let cache = Cache::new(2 * 84);

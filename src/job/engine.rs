@@ -212,7 +212,12 @@ impl Engine {
         match outcome {
             Outcome::Done(produced) => self.keep(claim, produced, seconds).await,
             Outcome::Failed(problem) => {
-                tracing::warn!(step = claim.stage().name(), code = problem.code, detail = problem.detail, "step failed");
+                tracing::warn!(
+                    step = claim.stage().name(),
+                    code = problem.code,
+                    detail = problem.detail,
+                    "step failed"
+                );
                 let mut changed = Changed::default();
                 let mut tx = self.database.begin_write().await?;
                 graph::fail(&mut tx, claim, &problem, seconds, &mut changed).await?;
@@ -331,7 +336,10 @@ impl Engine {
     /// Asks the steps of a registration to stop.
     fn stop(&self, registration: i64) {
         let running = lock(&self.running);
-        running.values().filter(|own| own.registration == registration).for_each(|own| own.stop(Stop::Canceled));
+        running
+            .values()
+            .filter(|own| own.registration == registration)
+            .for_each(|own| own.stop(Stop::Canceled));
     }
 
     /// Asks all steps to stop, because the program ends.

@@ -94,7 +94,8 @@ pub(super) async fn claim(
     let run = "UPDATE step SET state = 'running', runs = runs + 1 WHERE id = ? RETURNING runs";
     let run: i64 = sqlx::query_scalar(run).bind(id).fetch_one(&mut *tx).await?;
     let stages: Vec<JobStage> = from_json(row.try_get("stages")?)?;
-    let name = stages.get(usize::try_from(stage).map_err(broken)?).ok_or_else(|| broken("a step has no stage"))?;
+    let name =
+        stages.get(usize::try_from(stage).map_err(broken)?).ok_or_else(|| broken("a step has no stage"))?;
     if row.try_get::<&str, _>("status")? == "queued" {
         let event = EventKind::Status { status: Status::Running };
         changed.events.push(add_event(tx, registration, event).await?);
@@ -103,7 +104,8 @@ pub(super) async fn claim(
         let event = EventKind::Stage { stage: name.name().to_owned() };
         changed.events.push(add_event(tx, registration, event).await?);
     }
-    let begin = "UPDATE registration SET status = 'running', started_at = coalesce(started_at, ?1), turn = turn + ?2,
+    let begin =
+        "UPDATE registration SET status = 'running', started_at = coalesce(started_at, ?1), turn = turn + ?2,
         stage = max(coalesce(stage, 0), ?3) WHERE sequence = ?4";
     sqlx::query(begin).bind(now()).bind(ASSUMED).bind(stage).bind(registration).execute(&mut *tx).await?;
     let child = "UPDATE child SET status = 'running', started_at = coalesce(started_at, ?1), stage = ?2
@@ -183,7 +185,8 @@ pub(super) async fn redo(
     changed: &mut Changed,
 ) -> Result<bool, StoreError> {
     let again = "UPDATE step SET state = 'ready', output = NULL WHERE registration = ? AND output = ? AND state = 'done'";
-    let again = sqlx::query(again).bind(claim.registration).bind(output.to_string()).execute(&mut *tx).await?;
+    let again =
+        sqlx::query(again).bind(claim.registration).bind(output.to_string()).execute(&mut *tx).await?;
     if again.rows_affected() == 0 {
         return Ok(false);
     }
@@ -211,7 +214,9 @@ pub(super) async fn end(
         let event = EventKind::Child { scan, status: of_child, verdict: None, problem: None };
         changed.events.push(add_event(tx, registration, event).await?);
     }
-    let outputs = sqlx::query_scalar::<_, String>("SELECT output FROM step WHERE registration = ? AND output IS NOT NULL");
+    let outputs = sqlx::query_scalar::<_, String>(
+        "SELECT output FROM step WHERE registration = ? AND output IS NOT NULL",
+    );
     let outputs = outputs.bind(registration).fetch_all(&mut *tx).await?;
     changed.dropped.extend(outputs.iter().filter_map(|digest| digest.parse::<Sha256>().ok()));
     changed.ended.push(registration);
@@ -252,8 +257,7 @@ async fn end_child(
     let query = sqlx::query_scalar::<_, String>(query).bind(json(&verdict)).bind(now());
     let scan = query.bind(claim.registration).bind(claim.place).fetch_one(&mut *tx).await?;
     let scan = scan.parse().map_err(broken)?;
-    let event =
-        EventKind::Child { scan, status: Status::Succeeded, verdict: Some(verdict), problem: None };
+    let event = EventKind::Child { scan, status: Status::Succeeded, verdict: Some(verdict), problem: None };
     changed.events.push(add_event(tx, claim.registration, event).await?);
     Ok(())
 }
@@ -301,8 +305,10 @@ pub(super) async fn follow(
     }
     let waiting = "UPDATE step SET state = 'ready' WHERE registration = ?1 AND state = 'waiting' AND NOT EXISTS
         (SELECT 1 FROM step o WHERE o.registration = ?1 AND o.state IN ('ready', 'running') AND o.stage < step.stage)";
-    changed.ready += sqlx::query(waiting).bind(registration).execute(&mut *tx).await?.rows_affected() as usize;
-    let open = "SELECT count(*) FROM step WHERE registration = ? AND state IN ('waiting', 'ready', 'running')";
+    changed.ready +=
+        sqlx::query(waiting).bind(registration).execute(&mut *tx).await?.rows_affected() as usize;
+    let open =
+        "SELECT count(*) FROM step WHERE registration = ? AND state IN ('waiting', 'ready', 'running')";
     if sqlx::query_scalar::<_, i64>(open).bind(registration).fetch_one(&mut *tx).await? > 0 {
         return Ok(());
     }

@@ -30,8 +30,19 @@ pub(super) enum Inputs {
         limits: ScanLimits,
         scratch: PathBuf,
     },
-    Scan { stage: PlanStage, plan: PlanBytes, source: Source, own: Option<Vec<u8>>, shared: Option<Vec<u8>> },
-    Shared { stage: PlanStage, plan: PlanBytes, scans: Vec<Vec<u8>>, shared: Option<Vec<u8>> },
+    Scan {
+        stage: PlanStage,
+        plan: PlanBytes,
+        source: Source,
+        own: Option<Vec<u8>>,
+        shared: Option<Vec<u8>>,
+    },
+    Shared {
+        stage: PlanStage,
+        plan: PlanBytes,
+        scans: Vec<Vec<u8>>,
+        shared: Option<Vec<u8>>,
+    },
     Package {
         plan: PlanBytes,
         place: i64,
@@ -78,9 +89,7 @@ impl Inputs {
     pub async fn fetch(engine: &Engine, claim: &Claim) -> Result<Self, StoreError> {
         let reader = Reader { engine, claim };
         match claim.stage() {
-            JobStage::Inspect => {
-                Ok(Self::Inspect(reader.source(&reader.member().await?, None).await?))
-            }
+            JobStage::Inspect => Ok(Self::Inspect(reader.source(&reader.member().await?, None).await?)),
             JobStage::Plan => reader.plan_inputs().await,
             JobStage::Engine(stage) if stage.is_shared() => Ok(Self::Shared {
                 stage,
@@ -91,7 +100,13 @@ impl Inputs {
             JobStage::Engine(stage) => {
                 let plan = reader.plan().await?;
                 let source = reader.source(&reader.member().await?, Some(plan.digest)).await?;
-                Ok(Self::Scan { stage, plan, source, own: reader.own().await?, shared: reader.shared().await? })
+                Ok(Self::Scan {
+                    stage,
+                    plan,
+                    source,
+                    own: reader.own().await?,
+                    shared: reader.shared().await?,
+                })
             }
             JobStage::Package => {
                 let member = reader.member().await?;
@@ -202,7 +217,8 @@ impl Reader<'_> {
     /// The last state of the step's own scan that an engine stage left.
     async fn own(&self) -> Result<Option<Vec<u8>>, StoreError> {
         let first = JobStage::FIRST.len() as i64;
-        let own = (first..self.claim.number).rev().find(|&number| !self.claim.stages[number as usize].is_shared());
+        let own =
+            (first..self.claim.number).rev().find(|&number| !self.claim.stages[number as usize].is_shared());
         let Some(number) = own else { return Ok(None) };
         let digest = self.output(number, self.claim.place).await?;
         Ok(match digest {
@@ -214,7 +230,8 @@ impl Reader<'_> {
     /// The last state that all share.
     async fn shared(&self) -> Result<Option<Vec<u8>>, StoreError> {
         let first = JobStage::FIRST.len() as i64;
-        let shared = (first..self.claim.number).rev().find(|&number| self.claim.stages[number as usize].is_shared());
+        let shared =
+            (first..self.claim.number).rev().find(|&number| self.claim.stages[number as usize].is_shared());
         let Some(number) = shared else { return Ok(None) };
         match self.output(number, ALL).await? {
             Some(digest) => Ok(Some(self.engine.blobs.read(digest).await?.into())),
@@ -224,7 +241,8 @@ impl Reader<'_> {
 
     async fn output(&self, number: i64, place: i64) -> Result<Option<Sha256>, StoreError> {
         let query = "SELECT output FROM step WHERE registration = ? AND stage = ? AND place = ? AND output IS NOT NULL";
-        let query = sqlx::query_scalar::<_, String>(query).bind(self.claim.registration).bind(number).bind(place);
+        let query =
+            sqlx::query_scalar::<_, String>(query).bind(self.claim.registration).bind(number).bind(place);
         let digest = query.fetch_optional(self.engine.database.reader()).await?;
         digest.map(|digest| digest.parse().map_err(broken)).transpose()
     }
@@ -245,8 +263,10 @@ impl Reader<'_> {
     }
 
     async fn failed(&self) -> Result<Vec<FailedScan>, StoreError> {
-        let query = "SELECT name, problem FROM child WHERE registration = ? AND status = 'failed' ORDER BY name";
-        let rows = sqlx::query(query).bind(self.claim.registration).fetch_all(self.engine.database.reader()).await?;
+        let query =
+            "SELECT name, problem FROM child WHERE registration = ? AND status = 'failed' ORDER BY name";
+        let rows =
+            sqlx::query(query).bind(self.claim.registration).fetch_all(self.engine.database.reader()).await?;
         let failed = rows.iter().map(|row| {
             let problem: Option<Problem> =
                 row.try_get::<Option<&str>, _>("problem")?.map(from_json).transpose()?;
@@ -259,7 +279,8 @@ impl Reader<'_> {
     /// Seconds of work in each stage.
     async fn seconds(&self) -> Result<BTreeMap<String, f64>, StoreError> {
         let query = "SELECT stage, sum(coalesce(seconds, 0.0)) AS seconds FROM step WHERE registration = ? GROUP BY stage";
-        let rows = sqlx::query(query).bind(self.claim.registration).fetch_all(self.engine.database.reader()).await?;
+        let rows =
+            sqlx::query(query).bind(self.claim.registration).fetch_all(self.engine.database.reader()).await?;
         let mut seconds = BTreeMap::new();
         for row in rows {
             if let Some(stage) = self.claim.stages.get(row.try_get::<i64, _>("stage")? as usize) {

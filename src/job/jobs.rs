@@ -129,7 +129,8 @@ impl Jobs {
         let turn = "SELECT coalesce(min(turn), 0.0) FROM registration WHERE status IN ('queued', 'running') AND priority = ?";
         let priority = priority_number(new.priority);
         let turn: f64 = sqlx::query_scalar(turn).bind(priority).fetch_one(&mut *tx).await?;
-        let insert = "INSERT INTO registration (id, record, name, owner, dedupe_key, status, priority, template,
+        let insert =
+            "INSERT INTO registration (id, record, name, owner, dedupe_key, status, priority, template,
                 template_parts, settings, webhook, stages, turn, keep, created_at)
             VALUES (?, ?, ?, ?, ?, 'queued', ?, ?, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT (dedupe_key) DO NOTHING
             RETURNING sequence";
@@ -179,7 +180,8 @@ impl Jobs {
         let earlier = self.get(to).await?;
         let template = TemplateChoice::Of(to.clone());
         let (name, priority) = (earlier.name, earlier.priority);
-        self.submit(NewRegistration { name, priority, scans, template, owner, ..NewRegistration::default() }).await
+        self.submit(NewRegistration { name, priority, scans, template, owner, ..NewRegistration::default() })
+            .await
     }
 
     /// How it stands.
@@ -252,8 +254,13 @@ impl Jobs {
         let row = row.fetch_optional(self.engine.database.reader()).await?.ok_or_else(|| no_such(id))?;
         let Some(digest) = row.try_get::<Option<&str>, _>("digest")? else {
             return Err(match status_of(row.try_get("status")?)? {
-                status if status.is_final() => JobError::NotFound(format!("{} of registration {id}", file.path())),
-                _ => JobError::Conflict(format!("{} is not there yet: wait for the registration's end", file.path())),
+                status if status.is_final() => {
+                    JobError::NotFound(format!("{} of registration {id}", file.path()))
+                }
+                _ => JobError::Conflict(format!(
+                    "{} is not there yet: wait for the registration's end",
+                    file.path()
+                )),
             });
         };
         let size: i64 = row.try_get("size")?;
@@ -267,13 +274,16 @@ impl Jobs {
     pub async fn set(&self, id: &RegistrationId) -> Result<Vec<(String, BlobInfo)>, JobError> {
         let registration = self.get(id).await?;
         if !registration.status.is_final() {
-            return Err(JobError::Conflict("the set is not there yet: wait for the registration's end".to_owned()));
+            return Err(JobError::Conflict(
+                "the set is not there yet: wait for the registration's end".to_owned(),
+            ));
         }
         let mut names: BTreeMap<String, String> = BTreeMap::new();
         for child in &registration.children {
             names.insert(ResultFile::Mesh(child.scan.clone()).path(), format!("{}.glb", child.name));
         }
-        let query = "SELECT f.file, f.digest, f.size FROM result f JOIN registration r ON r.sequence = f.registration
+        let query =
+            "SELECT f.file, f.digest, f.size FROM result f JOIN registration r ON r.sequence = f.registration
             WHERE r.id = ? ORDER BY f.file";
         let rows = sqlx::query(query).bind(id.as_str()).fetch_all(self.engine.database.reader()).await?;
         if rows.is_empty() {
@@ -326,7 +336,8 @@ impl Jobs {
     }
 
     async fn by_dedupe_key(&self, key: &str) -> Result<Option<Registration>, JobError> {
-        let query = sqlx::query_scalar::<_, String>("SELECT id FROM registration WHERE dedupe_key = ?").bind(key);
+        let query =
+            sqlx::query_scalar::<_, String>("SELECT id FROM registration WHERE dedupe_key = ?").bind(key);
         match query.fetch_optional(self.engine.database.reader()).await? {
             Some(id) => Ok(Some(self.get(&id.parse().map_err(broken)?).await?)),
             None => Ok(None),
@@ -353,7 +364,9 @@ impl Jobs {
         let open: i64 = sqlx::query_scalar(open).bind(owner).fetch_one(tx).await?;
         let most = self.engine.settings.jobs_per_owner;
         if open as usize >= most {
-            return Err(JobError::TooMany(format!("{open} registrations are open, {most} may be: wait for one to end")));
+            return Err(JobError::TooMany(format!(
+                "{open} registrations are open, {most} may be: wait for one to end"
+            )));
         }
         Ok(())
     }
@@ -365,7 +378,8 @@ async fn insert_member(
     place: i64,
     member: &Member,
 ) -> Result<(), StoreError> {
-    let child = "INSERT INTO child (registration, place, scan, name, parts, status) VALUES (?, ?, ?, ?, ?, 'queued')";
+    let child =
+        "INSERT INTO child (registration, place, scan, name, parts, status) VALUES (?, ?, ?, ?, ?, 'queued')";
     let child = sqlx::query(child).bind(registration).bind(place).bind(member.scan.as_str());
     child.bind(&member.name).bind(json(&member.parts)).execute(&mut *tx).await?;
     let step = "INSERT INTO step (registration, stage, place, state) VALUES (?, 0, ?, 'ready')";

@@ -151,4 +151,3 @@ async fn take(_ticket: Ticket, engine: Data<Arc<Engine>>) -> Result<(), BoxDynEr
         }
     }
 }
-

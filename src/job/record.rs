@@ -211,4 +211,3 @@ pub(super) async fn events(
     };
     rows.iter().map(event).collect()
 }
-

@@ -44,7 +44,12 @@ impl Source {
         let from = match (prepared, cache.subject(&key)) {
             (Some(prepared), _) => From::Prepared(prepared),
             (None, Some(subject)) => From::Read(subject),
-            _ => From::Files { files: ScanFiles::fetch(blobs, parts).await?, name: name.to_owned(), limits, scratch },
+            _ => From::Files {
+                files: ScanFiles::fetch(blobs, parts).await?,
+                name: name.to_owned(),
+                limits,
+                scratch,
+            },
         };
         Ok(Self { key, from })
     }
@@ -54,7 +59,8 @@ impl Source {
         match &self.from {
             From::Read(subject) => Ok(subject.clone()),
             From::Files { files, name, limits, scratch } => {
-                let read = files.read(limits, scratch).map_err(|fault| Fault::problem("unusable_scan", fault))?;
+                let read =
+                    files.read(limits, scratch).map_err(|fault| Fault::problem("unusable_scan", fault))?;
                 let subject = Arc::new(read.into_subject(name.clone()));
                 cache.keep_subject(self.key.clone(), &subject);
                 Ok(subject)

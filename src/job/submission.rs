@@ -93,7 +93,8 @@ pub(super) async fn settings(
             let files = TemplateFiles::fetch(blobs, parts).await?;
             let scratch = scratch.to_owned();
             let read = tokio::task::spawn_blocking(move || files.read(&limits, &scratch)).await;
-            let read = read.map_err(|_| JobError::invalid("template", "cannot be read: the reader crashed on it"))?;
+            let read =
+                read.map_err(|_| JobError::invalid("template", "cannot be read: the reader crashed on it"))?;
             read.map_err(|fault| JobError::invalid("template", fault))?.1
         }
         None => None,
@@ -104,7 +105,8 @@ pub(super) async fn settings(
         }
         Some(settings) => settings,
         None => {
-            let (preset, vertices) = (new.preset.unwrap_or(Preset::Default), new.vertices.unwrap_or(VERTICES));
+            let (preset, vertices) =
+                (new.preset.unwrap_or(Preset::Default), new.vertices.unwrap_or(VERTICES));
             Settings::preset(preset, vertices).map_err(|error| JobError::invalid("vertices", error))?
         }
     };

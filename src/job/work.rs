@@ -13,9 +13,9 @@ use super::stage::JobStage;
 use crate::formats::Sha256;
 use crate::pipeline::{
     BadState, ComparisonRow, FailedScan, FrozenCollection, InputEntry, Inspected, LandmarkEntry, MOST_ROWS,
-    Manifest, Observer, OutputEntry, OutputFormat, Placed, Plan, PlanStage, Precheck, Prepared, RegisterError,
-    Report, ScanEntry, ScanResult, ScanState, Settings, SharedState, Subject, Template, Verdict, comparison_row,
-    comparison_sheet, decode, encode, leave_out, precheck_inspected, record_bytes,
+    Manifest, Observer, OutputEntry, OutputFormat, Placed, Plan, PlanStage, Precheck, Prepared,
+    RegisterError, Report, ScanEntry, ScanResult, ScanState, Settings, SharedState, Subject, Template,
+    Verdict, comparison_row, comparison_sheet, decode, encode, leave_out, precheck_inspected, record_bytes,
 };
 use crate::preflight::LandmarkAudit;
 
@@ -228,7 +228,9 @@ impl PlanWork {
         });
         let gone: Vec<(i64, String)> = gone.collect();
         if kept.is_empty() {
-            let why = left_out.first().map_or(String::new(), |failed| format!(": `{}` {}", failed.name, failed.problem));
+            let why = left_out
+                .first()
+                .map_or(String::new(), |failed| format!(": `{}` {}", failed.name, failed.problem));
             return Err(Fault::problem("too_few_landmarks", format!("no scan can be registered{why}")));
         }
         let plan = match &self.template {

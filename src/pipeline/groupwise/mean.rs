@@ -66,7 +66,7 @@ mod tests {
             })
             .collect();
         let turn = Mat3A::from_axis_angle(Vec3::new(0.6, 0.0, 0.8), 0.7);
-        let moved = shape.iter().map(|p| turn * *p * 2.5 + Vec3A::new(3.0, -1.0, 0.5)).collect();
+        let moved: Vec<Vec3A> = shape.iter().map(|p| turn * *p * 2.5 + Vec3A::new(3.0, -1.0, 0.5)).collect();
         let mean = mean_shape(&[shape.clone(), moved], &[1.0, 3.0], &[vec![1.0; 40], vec![1.0; 40]]);
         let ratio = mean[0].distance(mean[7]) / shape[0].distance(shape[7]);
         for i in 1..40 {
@@ -82,7 +82,8 @@ mod tests {
             .collect();
         let mut wrong = shape.clone();
         wrong[30..].iter_mut().for_each(|p| *p += Vec3A::new(0.0, 9.0, 2.0));
-        let known = |count: usize| (0..40).map(|i| if i < count { 1.0 } else { 1e-9 }).collect();
+        let known =
+            |count: usize| -> Vec<f64> { (0..40).map(|i| if i < count { 1.0 } else { 1e-9 }).collect() };
         let mean = mean_shape(&[wrong, shape.clone()], &[1.0, 1.0], &[known(30), known(40)]);
         let ratio = mean[0].distance(mean[7]) / shape[0].distance(shape[7]);
         for i in 1..40 {
