@@ -9,10 +9,9 @@ use super::rate::RateLimits;
 use crate::job::api_key::ApiKeys;
 use crate::job::blobs::Blobs;
 use crate::job::idempotency::IdempotencyKeys;
-use crate::job::jobs::Jobs;
 use crate::job::scan::Scans;
 use crate::job::template::Templates;
-use crate::job::{DataFolder, Database, StoreError};
+use crate::job::{DataFolder, Database, JobSettings, Jobs, StoreError};
 
 /// What every route works with; cheap to clone.
 #[derive(Clone)]
@@ -23,7 +22,7 @@ pub struct Parts {
     /// What is set.
     pub config: Config,
     /// Where everything is kept.
-    pub folder: DataFolder,
+    pub folder: Arc<DataFolder>,
     /// The database in it.
     pub database: Database,
     /// The files in it.
@@ -47,30 +46,26 @@ pub struct Parts {
 }
 
 impl App {
-    /// The service over a data folder and its running jobs.
+    /// The service over a data folder, whose unfinished work goes on.
     ///
     /// # Errors
     /// [`StoreError`] if the database fails.
-    pub async fn new(
+    pub async fn start(
         config: Config,
-        folder: DataFolder,
+        folder: Arc<DataFolder>,
         database: Database,
-        blobs: Blobs,
-        jobs: Jobs,
     ) -> Result<Self, StoreError> {
-        let (scan, requests) = (config.limits.scan, &config.limits.requests);
-        let scratch = folder.uploads();
-        let keep = config.retention.scans();
+        let blobs = Blobs::open(folder.path())?;
+        let (limits, requests) = (config.limits.scan, &config.limits.requests);
+        let (keep, at_once) = (config.retention.scans(), requests.read_at_once);
+        let scans = Scans::new(database.clone(), blobs.clone(), folder.uploads(), limits, keep, at_once);
+        let templates = Templates::new(database.clone(), blobs.clone(), folder.uploads(), limits);
+        let both = (scans.clone(), templates.clone());
+        let settings = JobSettings::from(&config);
         let parts = Parts {
-            scans: Scans::new(
-                database.clone(),
-                blobs.clone(),
-                scratch.clone(),
-                scan,
-                keep,
-                requests.read_at_once,
-            ),
-            templates: Templates::new(database.clone(), blobs.clone(), scratch, scan),
+            jobs: Jobs::start(folder.clone(), database.clone(), blobs.clone(), both, settings).await?,
+            scans,
+            templates,
             keys: ApiKeys::new(database.clone()),
             idempotency: IdempotencyKeys::open(database.clone()).await?,
             metrics: Metrics::new(),
@@ -80,7 +75,6 @@ impl App {
             folder,
             database,
             blobs,
-            jobs,
         };
         Ok(Self(Arc::new(parts)))
     }

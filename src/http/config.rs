@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 
+use crate::job::JobSettings;
 use crate::job::scan::ScanLimits;
 
 /// Everything that can be set about the service, with its defaults: a TOML file has the same names.
@@ -18,6 +19,8 @@ pub struct Config {
     pub data: DataConfig,
     /// How much is taken.
     pub limits: Limits,
+    /// How work is done.
+    pub work: WorkConfig,
     /// How long things are kept.
     pub retention: Retention,
     /// How ends of registrations are told.
@@ -84,6 +87,18 @@ pub struct RegistrationLimits {
     pub unfinished_per_key: usize,
     /// Seconds that one step, as the fit of one scan, may take.
     pub step_seconds: u64,
+    /// Seconds of work that one may take, over all its steps.
+    pub seconds: u64,
+}
+
+/// How work is done.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct WorkConfig {
+    /// Threads that compute; 0 for one each processor.
+    pub threads: usize,
+    /// Bytes of scans that are kept ready between steps.
+    pub cache_bytes: usize,
 }
 
 /// How often may be asked.
@@ -160,7 +175,13 @@ impl Default for DataConfig {
 
 impl Default for RegistrationLimits {
     fn default() -> Self {
-        Self { scans: 1000, unfinished_per_key: 100, step_seconds: 1800 }
+        Self { scans: 5000, unfinished_per_key: 1000, step_seconds: 1200, seconds: 24 * 3600 }
+    }
+}
+
+impl Default for WorkConfig {
+    fn default() -> Self {
+        Self { threads: 0, cache_bytes: 1 << 30 }
     }
 }
 
@@ -213,6 +234,24 @@ impl Config {
             KeyPolicy::Auto => !self.server.listen.ip().is_loopback(),
             KeyPolicy::Required => true,
             KeyPolicy::Off => false,
+        }
+    }
+}
+
+impl From<&Config> for JobSettings {
+    fn from(config: &Config) -> Self {
+        let (usual, limits) = (Self::default(), &config.limits.registration);
+        Self {
+            threads: if config.work.threads > 0 { config.work.threads } else { usual.threads },
+            scans: limits.scans,
+            jobs_per_owner: limits.unfinished_per_key,
+            step_time: Duration::from_secs(limits.step_seconds),
+            job_time: Duration::from_secs(limits.seconds),
+            cache_bytes: config.work.cache_bytes,
+            keep_free: config.data.keep_free_bytes,
+            keep: config.retention.registrations(),
+            scan_limits: config.limits.scan,
+            ..usual
         }
     }
 }

@@ -1,8 +1,8 @@
 //! What the layers below refuse, as problems.
 
 use super::problem::{Kind, Problem};
+use crate::job::JobError;
 use crate::job::StoreError;
-use crate::job::jobs::JobError;
 use crate::job::scan::{ScanError, ScanFault};
 use crate::job::template::TemplateError;
 
@@ -85,10 +85,7 @@ impl From<JobError> for Problem {
                 .remedied("wait until one has ended, or cancel one")
                 .retry_after(10),
             JobError::Unavailable(_) => Self::new(Kind::StorageUnavailable, error).retry_after(STORAGE_RETRY),
-            JobError::Store(_) => {
-                tracing::error!(%error, "the job store failed");
-                Self::new(Kind::Internal, "the server's store failed; its log says more")
-            }
+            JobError::Store(error) => error.into(),
         }
     }
 }

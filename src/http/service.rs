@@ -1,5 +1,6 @@
 use std::io;
 use std::net::SocketAddr;
+use std::sync::Arc;
 use std::time::Duration;
 
 use axum::extract::connect_info::IntoMakeServiceWithConnectInfo;
@@ -9,8 +10,6 @@ use super::app::App;
 use super::config::{Config, KeyPolicy};
 use super::webhook::{self, WebhookSecret};
 use crate::job::api_key::ApiKeys;
-use crate::job::blobs::Blobs;
-use crate::job::jobs::Jobs;
 use crate::job::webhook_outbox::WebhookOutbox;
 use crate::job::{DataFolder, Database, StoreError};
 
@@ -78,9 +77,7 @@ impl Service {
         let listen = |error| ServiceError::Listen { address, error };
         let listener = TcpListener::bind(address).await.map_err(listen)?;
         let address = listener.local_addr().map_err(listen)?;
-        let blobs = Blobs::open(folder.path())?;
-        let jobs = Jobs {};
-        let app = App::new(config, folder, database, blobs, jobs).await?;
+        let app = App::start(config, Arc::new(folder), database).await?;
         Ok(Self { app, listener, address, secret })
     }
 
@@ -119,6 +116,7 @@ impl Service {
         ending.cancel();
         // A delivery under way is tried again after the next start.
         let _ = tokio::time::timeout(Duration::from_secs(1), webhooks).await;
+        app.jobs.close().await;
         app.database.close().await;
         outcome
     }

@@ -16,6 +16,31 @@ pub use data_folder::DataFolder;
 pub use database::Database;
 pub use store_error::StoreError;
 
+mod cache;
+mod compute;
+mod engine;
+mod error;
+/// What happens to registrations.
 pub mod event;
+mod feed;
+mod graph;
+mod inputs;
 pub mod jobs;
+mod queue;
+mod record;
+/// Registrations as they are asked for and told of.
 pub mod registration;
+mod settings;
+mod source;
+mod stage;
+mod submission;
+mod supervisor;
+mod sweep;
+#[cfg(test)]
+mod tests;
+mod work;
+
+pub use error::JobError;
+pub use feed::EventFeed;
+pub use jobs::Jobs;
+pub use settings::JobSettings;

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::scan::ScanId;
 use super::template::TemplateId;
-use crate::pipeline::{Preset, Verdict};
+use crate::pipeline::{MANIFEST, Preset, REPORT, SHEET, TEMPLATE, Verdict};
 
 /// Names a registration; sorts by the time it was asked for.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -171,8 +171,6 @@ pub struct Registration {
     pub name: Option<String>,
     /// How far it is.
     pub status: Status,
-    /// Whether it was asked to stop.
-    pub cancel_requested: bool,
     /// While it is queued: how many are before it.
     pub queue_position: Option<u64>,
     /// What is done to the scans now.
@@ -243,4 +241,18 @@ pub enum ResultFile {
     Template,
     /// `sheet.png`.
     Sheet,
+}
+
+impl ResultFile {
+    /// Where it is beneath the registration: `meshes/{scan}.glb`, `manifest.json`, ...
+    pub fn path(&self) -> String {
+        match self {
+            Self::Mesh(scan) => format!("meshes/{scan}.glb"),
+            Self::Manifest => MANIFEST.to_owned(),
+            Self::Report => REPORT.to_owned(),
+            Self::Landmarks => "landmarks.json".to_owned(),
+            Self::Template => TEMPLATE.to_owned(),
+            Self::Sheet => SHEET.to_owned(),
+        }
+    }
 }

@@ -110,7 +110,7 @@ async fn landmarks(
 ///
 /// The collection's mean with its landmarks and settings, which POST of /v1/templates takes.
 #[utoipa::path(
-    get, path = "/v1/registrations/{id}/template.glb", operation_id = "get_registration_template", tag = "results",
+    get, path = "/v1/registrations/{id}/template.frozen.glb", operation_id = "get_registration_template", tag = "results",
     params(("id" = String, Path, description = "The registration's id.", pattern = "^[0-9a-f]{32}$")),
     responses((status = 200, description = "Binary glTF.", body = Binary, content_type = "model/gltf-binary", headers(("ETag" = String)))),
 )]

@@ -23,8 +23,9 @@ use crate::http::webhook::check_address;
 use crate::http::wire::registration::{
     AddedScans, RegistrationRequest, RegistrationSummary, RegistrationView, StatusName,
 };
+use crate::job::JobError;
 use crate::job::event::EventKind;
-use crate::job::jobs::{JobError, Page as JobPage};
+use crate::job::jobs::Page as JobPage;
 use crate::job::registration::{Registration, RegistrationId};
 
 /// Seconds that a client may ask to wait.

@@ -40,7 +40,7 @@ struct TemplateQuery {
 
 /// Uploads a template
 ///
-/// A mesh with its landmarks as a form, or the `template.glb` of a finished registration as the body. The same files under
+/// A mesh with its landmarks as a form, or the `template.frozen.glb` of a finished registration as the body. The same files under
 /// the same name again give the same template, with status 200.
 #[utoipa::path(
     post, path = "/v1/templates", operation_id = "create_template", tag = "templates",

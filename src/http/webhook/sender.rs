@@ -9,8 +9,8 @@ use super::signature::WebhookSecret;
 use crate::http::app::App;
 use crate::http::wire::registration::RegistrationSummary;
 use crate::http::wire::rfc3339;
+use crate::job::JobError;
 use crate::job::StoreError;
-use crate::job::jobs::JobError;
 use crate::job::webhook_outbox::{Delivery, WebhookOutbox};
 
 /// Deliveries that are tried at the same time.

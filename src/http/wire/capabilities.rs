@@ -22,8 +22,9 @@ pub const USUAL_VERTICES: usize = 10242;
     "keys_required": false,
     "limits": {
         "upload_bytes": 536870912, "vertices": 5000000, "triangles": 10000000, "texture_pixels": 268435456,
-        "unpacked_bytes": 2147483648_u64, "zip_files": 64, "scans_per_registration": 1000,
-        "unfinished_registrations": 100, "requests_per_second": 500, "step_seconds": 1800
+        "unpacked_bytes": 2147483648_u64, "zip_files": 64, "scans_per_registration": 5000,
+        "unfinished_registrations": 1000, "requests_per_second": 500, "step_seconds": 1200,
+        "registration_seconds": 86400
     },
     "retention_days": { "scans": 30, "registrations": 30 }
 }))]
@@ -74,6 +75,8 @@ pub struct LimitsView {
     requests_per_second: u64,
     /// Seconds that one step, as the fit of one scan, may take.
     step_seconds: u64,
+    /// Seconds of work that one registration may take, over all its steps.
+    registration_seconds: u64,
 }
 
 /// How long things are kept, in days; 0 keeps them.
@@ -109,6 +112,7 @@ impl From<&Config> for Capabilities {
                 unfinished_registrations: registration.unfinished_per_key as u64,
                 requests_per_second: config.limits.requests.per_second.into(),
                 step_seconds: registration.step_seconds,
+                registration_seconds: registration.seconds,
             },
             retention_days: RetentionView {
                 scans: config.retention.scan_days,

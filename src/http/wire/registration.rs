@@ -409,7 +409,7 @@ impl From<Registration> for RegistrationView {
                 report: format!("{root}/report.json"),
                 landmarks: format!("{root}/landmarks.json"),
                 set: format!("{root}/set.zip"),
-                template: format!("{root}/template.glb"),
+                template: format!("{root}/template.frozen.glb"),
                 sheet: format!("{root}/sheet.png"),
             }),
             summary: own.into(),
