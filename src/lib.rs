@@ -49,6 +49,7 @@ pub mod density;
 pub mod energy;
 pub mod evaluate;
 pub mod formats;
+pub mod http;
 pub mod job;
 pub mod mesh;
 pub mod numeric;

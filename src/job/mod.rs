@@ -10,6 +10,7 @@ pub mod idempotency;
 pub mod scan;
 mod store_error;
 pub mod template;
+pub mod webhook_outbox;
 
 pub use data_folder::DataFolder;
 pub use database::Database;
