@@ -274,13 +274,20 @@ impl Engine {
     async fn store_failed(&self, claim: &Claim, error: StoreError) -> Result<(), StoreError> {
         let mut changed = Changed::default();
         let mut tx = self.database.begin_write().await?;
-        let (StoreError::Corrupted { digest } | StoreError::Missing { digest }) = &error else {
-            graph::give_back(&mut tx, claim).await?;
-            tx.commit().await?;
-            return Err(error);
+        let again = match &error {
+            StoreError::Corrupted { digest } | StoreError::Missing { digest } => {
+                graph::redo(&mut tx, claim, *digest, &mut changed).await?
+            }
+            // What is recorded will not change.
+            StoreError::Record { .. } => false,
+            _ => {
+                graph::give_back(&mut tx, claim).await?;
+                tx.commit().await?;
+                return Err(error);
+            }
         };
-        tracing::error!(%error, step = claim.stage().name(), "a blob is damaged");
-        if !graph::redo(&mut tx, claim, *digest, &mut changed).await? {
+        tracing::error!(%error, step = claim.stage().name(), again, "a step's inputs are damaged");
+        if !again {
             let problem = Problem { code: "storage".to_owned(), detail: error.to_string() };
             graph::fail(&mut tx, claim, &problem, 0.0, &mut changed).await?;
         }
