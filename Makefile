@@ -1,6 +1,6 @@
 # Works from a fresh checkout on Debian: what is missing is installed first, as root or by sudo.
 
-.PHONY: demo test bench licences templates contract openapi rust validator schemathesis
+.PHONY: demo test durability contract bench licences openapi templates rust validator schemathesis
 
 # The demo collection, registered: meshes, report and picture.
 demo: rust
@@ -9,6 +9,10 @@ demo: rust
 # Every test there is.
 test: rust validator schemathesis
 	cargo test --workspace --locked
+
+# The server killed twenty times in the middle of twelve scans; minutes.
+durability: rust
+	cargo test --release --locked --test durability -- --ignored
 
 # How long each stage and kernel takes.
 bench: rust

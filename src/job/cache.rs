@@ -72,6 +72,13 @@ impl Cache {
         lock(&self.scans).keep(key, Kept::Prepared(prepared.clone()), prepared.bytes());
     }
 
+    /// Forgets what was made ready for plans that are no longer needed.
+    pub fn forget(&self, plans: &[Sha256]) {
+        lock(&self.scans).forget(plans);
+        let mut kept = lock(&self.plans);
+        plans.iter().for_each(|plan| drop(kept.pop(plan)));
+    }
+
     /// A plan.
     pub fn plan(&self, digest: Sha256) -> Option<Arc<PlanFile>> {
         lock(&self.plans).get(&digest).cloned()
@@ -84,6 +91,14 @@ impl Cache {
 }
 
 impl Scans {
+    fn forget(&mut self, plans: &[Sha256]) {
+        let gone = |key: &&Key| key.plan.is_some_and(|plan| plans.contains(&plan));
+        let gone: Vec<Key> = self.kept.iter().map(|(key, _)| key).filter(gone).cloned().collect();
+        for key in gone {
+            self.bytes -= self.kept.pop(&key).map_or(0, |(_, bytes)| bytes);
+        }
+    }
+
     fn keep(&mut self, key: Key, kept: Kept, bytes: usize) {
         if let Some((_, before)) = self.kept.put(key, (kept, bytes)) {
             self.bytes -= before;

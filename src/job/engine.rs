@@ -252,7 +252,8 @@ impl Engine {
         let mut changed = Changed::default();
         let mut tx = self.database.begin_write().await?;
         let done = Done { output: output_digest, files: records, decided, seconds };
-        if graph::finish(&mut tx, claim, done, &mut changed).await? {
+        let own = graph::finish(&mut tx, claim, done, &mut changed).await?;
+        if own {
             self.steps.fetch_add(1, Ordering::Relaxed);
             let mut spent = lock(&self.spent);
             let (count, sum) = spent.entry(claim.stage().name()).or_default();
@@ -260,7 +261,12 @@ impl Engine {
         }
         graph::end_if_too_long(&mut tx, claim.registration, self.settings.job_time, &mut changed).await?;
         self.commit(tx, changed).await?;
+        let digests = held.iter().map(|kept| kept.info.digest).collect();
         drop(held);
+        if !own {
+            // The registration ended meanwhile: nobody will name these.
+            sweep::collect(self, digests).await?;
+        }
         Ok(())
     }
 
@@ -268,13 +274,20 @@ impl Engine {
     async fn store_failed(&self, claim: &Claim, error: StoreError) -> Result<(), StoreError> {
         let mut changed = Changed::default();
         let mut tx = self.database.begin_write().await?;
-        let (StoreError::Corrupted { digest } | StoreError::Missing { digest }) = &error else {
-            graph::give_back(&mut tx, claim).await?;
-            tx.commit().await?;
-            return Err(error);
+        let again = match &error {
+            StoreError::Corrupted { digest } | StoreError::Missing { digest } => {
+                graph::redo(&mut tx, claim, *digest, &mut changed).await?
+            }
+            // What is recorded will not change.
+            StoreError::Record { .. } => false,
+            _ => {
+                graph::give_back(&mut tx, claim).await?;
+                tx.commit().await?;
+                return Err(error);
+            }
         };
-        tracing::error!(%error, step = claim.stage().name(), "a blob is damaged");
-        if !graph::redo(&mut tx, claim, *digest, &mut changed).await? {
+        tracing::error!(%error, step = claim.stage().name(), again, "a step's inputs are damaged");
+        if !again {
             let problem = Problem { code: "storage".to_owned(), detail: error.to_string() };
             graph::fail(&mut tx, claim, &problem, 0.0, &mut changed).await?;
         }
@@ -286,6 +299,7 @@ impl Engine {
         queue::push(&mut tx, changed.ready).await?;
         tx.commit().await?;
         let dropped = changed.dropped.clone();
+        self.cache.forget(&dropped);
         self.publish(changed);
         if let Err(error) = sweep::collect(self, dropped).await {
             tracing::warn!(%error, "what is no longer needed cannot be deleted now");

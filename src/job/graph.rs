@@ -184,13 +184,16 @@ pub(super) async fn redo(
     output: Sha256,
     changed: &mut Changed,
 ) -> Result<bool, StoreError> {
-    let again = "UPDATE step SET state = 'ready', output = NULL WHERE registration = ? AND output = ? AND state = 'done'";
-    let again =
-        sqlx::query(again).bind(claim.registration).bind(output.to_string()).execute(&mut *tx).await?;
-    if again.rows_affected() == 0 {
+    let output = output.to_string();
+    // It keeps its output, so that others who find that damaged wait for it too.
+    let again = "UPDATE step SET state = 'ready' WHERE registration = ? AND output = ? AND state = 'done'";
+    let again = sqlx::query(again).bind(claim.registration).bind(&output).execute(&mut *tx).await?;
+    changed.ready += again.rows_affected() as usize;
+    let open = "SELECT count(*) FROM step WHERE registration = ? AND output = ? AND state IN ('waiting', 'ready', 'running')";
+    let open = sqlx::query_scalar::<_, i64>(open).bind(claim.registration).bind(&output);
+    if open.fetch_one(&mut *tx).await? == 0 {
         return Ok(false);
     }
-    changed.ready += again.rows_affected() as usize;
     let wait = "UPDATE step SET state = 'waiting' WHERE id = ? AND runs = ? AND state = 'running'";
     sqlx::query(wait).bind(claim.step).bind(claim.run).execute(tx).await?;
     Ok(true)
@@ -304,7 +307,7 @@ pub(super) async fn follow(
         changed.ready += begin.execute(&mut *tx).await?.rows_affected() as usize;
     }
     let waiting = "UPDATE step SET state = 'ready' WHERE registration = ?1 AND state = 'waiting' AND NOT EXISTS
-        (SELECT 1 FROM step o WHERE o.registration = ?1 AND o.state IN ('ready', 'running') AND o.stage < step.stage)";
+        (SELECT 1 FROM step o WHERE o.registration = ?1 AND o.state IN ('waiting', 'ready', 'running') AND o.stage < step.stage)";
     changed.ready +=
         sqlx::query(waiting).bind(registration).execute(&mut *tx).await?.rows_affected() as usize;
     let open =

@@ -159,6 +159,7 @@ impl Jobs {
         for (place, member) in (0..).zip(&members) {
             insert_member(&mut tx, sequence, place, member).await?;
         }
+        check_still_there(&mut tx, sequence, members.len()).await?;
         changed.ready = members.len();
         let event = EventKind::Status { status: Status::Queued };
         changed.events.push(add_event(&mut tx, sequence, event).await?);
@@ -325,6 +326,14 @@ impl Jobs {
         self.engine.finished.subscribe()
     }
 
+    /// Deletes what is over now, without waiting for the next time that it is looked for.
+    ///
+    /// # Errors
+    /// [`JobError::Store`].
+    pub async fn expire(&self) -> Result<(), JobError> {
+        Ok(sweep::expire(&self.engine).await?)
+    }
+
     /// Why no work is begun, if none is.
     pub fn paused(&self) -> Option<String> {
         self.engine.paused.borrow().clone()
@@ -385,6 +394,20 @@ async fn insert_member(
     let step = "INSERT INTO step (registration, stage, place, state) VALUES (?, 0, ?, 'ready')";
     sqlx::query(step).bind(registration).bind(place).execute(tx).await?;
     Ok(())
+}
+
+/// Whether no scan was deleted since it was looked at: from now on its files are kept.
+async fn check_still_there(
+    tx: &mut sqlx::SqliteConnection,
+    registration: i64,
+    members: usize,
+) -> Result<(), JobError> {
+    let there = "SELECT count(*) FROM child c JOIN scan s ON s.id = c.scan WHERE c.registration = ?";
+    let there: i64 = sqlx::query_scalar(there).bind(registration).fetch_one(tx).await?;
+    match there as usize == members {
+        true => Ok(()),
+        false => Err(JobError::invalid("scans", "one was deleted just now: leave it out")),
+    }
 }
 
 fn no_such(id: &RegistrationId) -> JobError {

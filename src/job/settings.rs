@@ -36,7 +36,7 @@ impl Default for JobSettings {
             step_time: Duration::from_secs(20 * 60),
             job_time: Duration::from_secs(24 * 3600),
             crashes: 5,
-            cache_bytes: 1 << 30,
+            cache_bytes: 512 << 20,
             keep_free: 1 << 30,
             keep: Some(Duration::from_secs(30 * 24 * 3600)),
             scan_limits: ScanLimits::default(),

@@ -1,6 +1,7 @@
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use super::clock::now;
 use super::engine::Engine;
 use super::store_error::StoreError;
 use super::{queue, sweep};
@@ -17,6 +18,7 @@ const SWEEP_ALL: Duration = Duration::from_secs(3600);
 pub(super) async fn watch(engine: Arc<Engine>) {
     let mut closing = engine.closing.subscribe();
     let (mut swept, mut swept_all) = (Instant::now(), Instant::now());
+    let mut told = now();
     while !*closing.borrow() {
         let pause = tokio::time::timeout(LOOK, closing.wait_for(|closing| *closing));
         if pause.await.is_ok() {
@@ -29,7 +31,13 @@ pub(super) async fn watch(engine: Arc<Engine>) {
         if swept.elapsed() < SWEEP {
             continue;
         }
-        swept = Instant::now();
+        let (jumped, time) = (jump(told, now(), swept.elapsed()), now());
+        (swept, told) = (Instant::now(), time);
+        if jumped > SWEEP {
+            // What seems to be over may not be: it is looked at again when the clock has gone on evenly.
+            tracing::warn!(seconds = jumped.as_secs(), "the clock jumped: nothing is deleted for now");
+            continue;
+        }
         let all = swept_all.elapsed() >= SWEEP_ALL;
         if all {
             swept_all = swept;
@@ -38,6 +46,12 @@ pub(super) async fn watch(engine: Arc<Engine>) {
             tracing::warn!(%error, "what is over cannot be deleted now");
         }
     }
+}
+
+/// How far the clock on the wall went apart from one that does not jump; times are milliseconds.
+fn jump(before: i64, after: i64, passed: Duration) -> Duration {
+    let passed = i64::try_from(passed.as_millis()).unwrap_or(i64::MAX);
+    Duration::from_millis(after.saturating_sub(before).saturating_sub(passed).unsigned_abs())
 }
 
 async fn look(engine: &Engine) -> Result<(), StoreError> {
@@ -71,4 +85,17 @@ async fn sweep(engine: &Engine, all: bool) -> Result<(), StoreError> {
         sweep::collect_all(engine).await?;
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_jump_is_seen_in_both_directions() {
+        let minute = Duration::from_secs(60);
+        assert_eq!(jump(1_000, 61_000, minute), Duration::ZERO);
+        assert_eq!(jump(1_000, 3_661_000, minute), Duration::from_secs(3600));
+        assert_eq!(jump(3_600_000, 60_000, minute), Duration::from_secs(3600));
+    }
 }

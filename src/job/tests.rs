@@ -205,3 +205,276 @@ async fn a_registration_gives_what_the_command_line_gives() {
     let kept: Vec<_> = futures_util::StreamExt::collect(service.blobs.list()).await;
     assert_eq!(kept.len() as i64, named);
 }
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn events_tell_the_whole_history_and_go_on_where_one_left() {
+    let service = Service::start(settings()).await;
+    let members = service.upload_all(&heads(2)).await;
+    let submitted = service.jobs.submit(asked(members)).await.unwrap();
+    let mut live = service.jobs.events_after(&submitted.id, 0).await.unwrap();
+    let mut seen = Vec::new();
+    while let Some(event) = live.next().await.unwrap() {
+        seen.push(event);
+    }
+    assert!(seen.iter().map(|event| event.sequence).eq(1..=seen.len() as u64));
+    let statuses = seen.iter().filter_map(|event| match event.kind {
+        EventKind::Status { status } => Some(status),
+        _ => None,
+    });
+    let statuses: Vec<Status> = statuses.collect();
+    assert_eq!(statuses, [Status::Queued, Status::Running, Status::Succeeded]);
+    let stages = seen.iter().filter_map(|event| match &event.kind {
+        EventKind::Stage { stage } => Some(stage.as_str()),
+        _ => None,
+    });
+    let stages: Vec<&str> = stages.collect();
+    assert_eq!(stages, ["inspect", "plan", "lay", "mean", "round", "mean", "round", "package", "set"]);
+    assert_eq!(seen.iter().filter(|event| matches!(event.kind, EventKind::Child { .. })).count(), 2);
+    for after in [0, 3, seen.len() as u64, 1000] {
+        let mut feed = service.jobs.events_after(&submitted.id, after).await.unwrap();
+        let mut again = Vec::new();
+        while let Some(event) = feed.next().await.unwrap() {
+            again.push(event);
+        }
+        assert_eq!(again, seen.get(after as usize..).unwrap_or_default());
+    }
+    assert_eq!(service.jobs.get(&submitted.id).await.unwrap().last_event, seen.len() as u64);
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_broken_scan_fails_alone() {
+    let service = Service::start(settings()).await;
+    let heads = heads(4);
+    let mut members = service.upload_all(&heads[..2]).await;
+    let strange = json!({ "one": [0.0, 0.0, 0.0], "two": [1.0, 0.0, 0.0], "three": [0.0, 1.0, 0.0] });
+    let strange = service.upload_bytes("strange", ply_bytes(&heads[2].mesh), strange.to_string()).await;
+    let damaged = service.upload(&heads[3]).await;
+    let mesh = service.scans.get(&damaged).await.unwrap().parts.mesh;
+    std::fs::write(service.blobs.path(mesh), "nothing of a mesh").unwrap();
+    for scan in [&strange, &damaged] {
+        members.push(NewMember { scan: scan.clone(), name: None });
+    }
+    let ended = service.ended(&service.jobs.submit(asked(members)).await.unwrap()).await;
+    assert_eq!(ended.status, Status::PartiallySucceeded);
+    let child = |scan: &ScanId| ended.children.iter().find(|child| child.scan == *scan).unwrap();
+    let problem = |scan: &ScanId| child(scan).problem.clone().unwrap();
+    assert_eq!(problem(&strange).code, "too_few_landmarks");
+    assert_eq!(problem(&damaged).code, "storage");
+    assert!(problem(&damaged).detail.contains("damaged"), "{:?}", problem(&damaged));
+    let succeeded = ended.children.iter().filter(|child| child.status == Status::Succeeded);
+    assert_eq!(succeeded.count(), 2);
+    let report: Value = serde_json::from_slice(&service.file(&ended, ResultFile::Report).await).unwrap();
+    assert_eq!(report["failed"].as_array().unwrap().len(), 2);
+    assert_eq!(report["scans"].as_array().unwrap().len(), 2);
+    let missing = service.jobs.result(&ended.id, &ResultFile::Mesh(strange)).await;
+    assert!(matches!(missing, Err(JobError::NotFound(_))));
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_scan_that_ends_the_program_again_and_again_fails_alone() {
+    let service = Service::start(JobSettings { threads: 1, ..settings() }).await;
+    let members = service.upload_all(&heads(3)).await;
+    let submitted = service.jobs.submit(asked(members)).await.unwrap();
+    let folder = service.end().await;
+    // As if the program had ended the fifth time while it inspected the second scan.
+    let database = Database::open(&folder.path().join("onemesh.db")).await.unwrap();
+    let poison = "UPDATE step SET state = 'running', crashes = 4, runs = 5 WHERE stage = 0 AND place = 1";
+    sqlx::query(poison).execute(database.writer()).await.unwrap();
+    database.close().await;
+    let service = Service::start_in(folder, settings()).await;
+    let ended = service.ended(&submitted).await;
+    assert_eq!(ended.status, Status::PartiallySucceeded);
+    assert_eq!(ended.children[1].problem.as_ref().unwrap().code, "crashed");
+    assert!(ended.children[1].problem.as_ref().unwrap().detail.contains("5 times"));
+    assert_eq!([0, 2].map(|at| ended.children[at].status), [Status::Succeeded; 2]);
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn what_is_canceled_stops_within_a_second() {
+    let service = Service::start(settings()).await;
+    let members = service.upload_all(&heads(2)).await;
+    let mut long = asked(members.clone());
+    long.parameters.insert("from_head".to_owned(), json!(false));
+    long.parameters.insert("fit.levels.0.iterations".to_owned(), json!(20_000));
+    let submitted = service.jobs.submit(long).await.unwrap();
+    let mut feed = service.jobs.events_after(&submitted.id, 0).await.unwrap();
+    let fits = |kind: &EventKind| matches!(kind, EventKind::Progress { stage, .. } if stage == "fit");
+    while !fits(&feed.next().await.unwrap().unwrap().kind) {}
+    let running = service.jobs.get(&submitted.id).await.unwrap();
+    assert!(running.status == Status::Running && running.progress > 0.0 && running.progress < 1.0);
+    let asked_at = Instant::now();
+    let canceled = service.jobs.cancel(&submitted.id).await.unwrap();
+    assert_eq!((canceled.status, canceled.children[0].status), (Status::Canceled, Status::Canceled));
+    while service.jobs.figures().await.unwrap().steps_running > 0 {
+        assert!(asked_at.elapsed() < Duration::from_secs(1), "it still runs");
+        tokio::time::sleep(Duration::from_millis(10)).await;
+    }
+    while feed.next().await.unwrap().is_some() {}
+    // The next one has the threads, and what was under way is gone.
+    let next = service.jobs.submit(asked(members)).await.unwrap();
+    assert_eq!(service.ended(&next).await.status, Status::Succeeded);
+    assert_eq!(service.jobs.cancel(&next.id).await.unwrap().status, Status::Succeeded);
+    service.jobs.delete(&next.id).await.unwrap();
+    service.jobs.delete(&submitted.id).await.unwrap();
+    assert!(matches!(service.jobs.get(&next.id).await, Err(JobError::NotFound(_))));
+    let kept: Vec<_> = futures_util::StreamExt::collect(service.blobs.list()).await;
+    assert_eq!(kept.len(), 4, "two scans with their landmarks");
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_small_registration_is_not_starved_by_a_large_one_and_priority_goes_first() {
+    let service = Service::start(JobSettings { threads: 1, ..settings() }).await;
+    let heads = heads(13);
+    let members = service.upload_all(&heads).await;
+    let large = service.jobs.submit(asked(members[..12].to_vec())).await.unwrap();
+    let small = service.jobs.submit(asked(members[12..].to_vec())).await.unwrap();
+    let low = NewRegistration { priority: Priority::Low, ..asked(members[12..].to_vec()) };
+    let low = service.jobs.submit(low).await.unwrap();
+    assert_eq!(service.ended(&small).await.status, Status::Succeeded);
+    let [large_then, low_then] = [&large, &low].map(|one| service.jobs.get(&one.id));
+    let (large_then, low_then) = (large_then.await.unwrap(), low_then.await.unwrap());
+    assert!(large_then.status == Status::Running && large_then.progress < 0.6, "{}", large_then.progress);
+    assert_eq!((low_then.status, low_then.queue_position), (Status::Queued, Some(0)));
+    assert_eq!(service.ended(&large).await.status, Status::Succeeded);
+    assert_ne!(service.jobs.get(&low.id).await.unwrap().status, Status::Succeeded);
+    assert_eq!(service.ended(&low).await.status, Status::Succeeded);
+    let latest = service.jobs.list(Page { limit: 2, ..Page::default() }).await.unwrap();
+    assert_eq!(latest.iter().map(|one| &one.id).collect::<Vec<_>>(), [&low.id, &small.id]);
+    let before = Page { limit: 9, before: Some(small.id.clone()), ..Page::default() };
+    assert_eq!(service.jobs.list(before).await.unwrap().len(), 1);
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn work_goes_on_where_it_was_left_and_makes_damaged_results_again() {
+    let service = Service::start(JobSettings { threads: 1, ..settings() }).await;
+    let members = service.upload_all(&heads(3)).await;
+    let undisturbed = service.ended(&service.jobs.submit(asked(members.clone())).await.unwrap()).await;
+    let expected = service.file(&undisturbed, ResultFile::Manifest).await;
+    let submitted = service.jobs.submit(asked(members)).await.unwrap();
+    let mut feed = service.jobs.events_after(&submitted.id, 0).await.unwrap();
+    let laid = |kind: &EventKind| matches!(kind, EventKind::Stage { stage } if stage == "round");
+    while !laid(&feed.next().await.unwrap().unwrap().kind) {}
+    drop(feed);
+    let folder = service.end().await;
+    let database = Database::open(&folder.path().join("onemesh.db")).await.unwrap();
+    let outputs = "SELECT DISTINCT output FROM step WHERE output IS NOT NULL";
+    let outputs: Vec<String> = sqlx::query_scalar(outputs).fetch_all(database.reader()).await.unwrap();
+    database.close().await;
+    assert!(outputs.len() >= 5, "{}", outputs.len());
+    for output in outputs {
+        let file = folder.path().join("blobs").join(&output[..2]).join(&output);
+        let mut bytes = std::fs::read(&file).unwrap();
+        bytes[0] ^= 1;
+        std::fs::write(&file, bytes).unwrap();
+    }
+    let service = Service::start_in(folder, settings()).await;
+    let ended = service.ended(&submitted).await;
+    assert_eq!((ended.status, &ended.problem), (Status::Succeeded, &None));
+    assert!(service.file(&ended, ResultFile::Manifest).await == expected);
+    assert_eq!(service.count("SELECT max(crashes) FROM step").await, 0);
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn later_scans_are_registered_to_what_is_frozen() {
+    let service = Service::start(settings()).await;
+    let heads = heads(3);
+    let members = service.upload_all(&heads).await;
+    let first = service.jobs.submit(asked(members[..2].to_vec())).await.unwrap();
+    let early = service.jobs.add_scans(&first.id, members[2..].to_vec(), None).await;
+    assert!(matches!(early, Err(JobError::Conflict(_))), "{early:?}");
+    let first = service.ended(&first).await;
+    let later = service.jobs.add_scans(&first.id, members[2..].to_vec(), None).await.unwrap();
+    assert_eq!(later.template, TemplateChoice::Of(first.id.clone()));
+    let later = service.ended(&later).await;
+    assert_eq!((later.status, &later.settings), (Status::Succeeded, &first.settings));
+    let frozen = service.file(&first, ResultFile::Template).await;
+    let frozen = crate::pipeline::FrozenCollection::parse(&frozen).unwrap().unwrap();
+    let head = &heads[2];
+    let subject = Subject {
+        name: head.name.clone(),
+        mesh: crate::formats::parse_mesh(&ply_bytes(&head.mesh), crate::formats::MeshFormat::Ply).unwrap(),
+        landmarks: head.landmarks.clone(),
+        mask: None,
+    };
+    let expected = register_to(&frozen.template, &[subject], &frozen.settings, &()).unwrap();
+    let mesh = service.file(&later, ResultFile::Mesh(members[2].scan.clone())).await;
+    let mesh = crate::formats::parse_mesh(&mesh, crate::formats::MeshFormat::Gltf).unwrap();
+    let farthest = mesh.positions().iter().zip(&expected.members[0]).map(|(a, b)| a.distance(*b));
+    assert!(farthest.fold(0.0, f64::max) < 1e-4);
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn a_full_disk_pauses_the_work_until_there_is_room() {
+    let service = Service::start(JobSettings { keep_free: u64::MAX, ..settings() }).await;
+    let members = service.upload_all(&heads(1)).await;
+    while service.jobs.paused().is_none() {
+        tokio::time::sleep(Duration::from_millis(20)).await;
+    }
+    let refused = service.jobs.submit(asked(members.clone())).await;
+    assert!(matches!(&refused, Err(JobError::Unavailable(why)) if why.contains("free")), "{refused:?}");
+    let folder = service.end().await;
+    let service = Service::start_in(folder, settings()).await;
+    let submitted = service.jobs.submit(asked(members)).await.unwrap();
+    assert_eq!(service.ended(&submitted).await.status, Status::Succeeded);
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn what_is_asked_for_wrongly_is_refused_by_its_field() {
+    let service = Service::start(JobSettings { jobs_per_owner: 0, scans: 2, ..settings() }).await;
+    let members = service.upload_all(&heads(3)).await;
+    let bare = service.blobs.put_bytes(ply_bytes(&heads(1)[0].mesh)).await.unwrap();
+    let bare = NewScan {
+        name: Some("bare".into()),
+        kind: MeshKind::Ply,
+        mesh: bare,
+        landmarks: None,
+        mask: None,
+        texture: None,
+    };
+    let bare = service.scans.add(bare).await.unwrap().0.id;
+    let refused = async |change: &dyn Fn(&mut NewRegistration)| {
+        let mut new = asked(members[..2].to_vec());
+        change(&mut new);
+        match service.jobs.submit(new).await {
+            Err(JobError::Invalid { field, problem }) => format!("{field}: {problem}"),
+            other => format!("{other:?}"),
+        }
+    };
+    let cases: [(&str, &dyn Fn(&mut NewRegistration)); 9] = [
+        ("scans: are 0", &|new| new.scans.clear()),
+        ("scans: are 3", &|new| new.scans = members.clone()),
+        ("scans[0]: scan", &|new| new.scans[0].scan = bare.clone()),
+        ("scans[1]: \"a/b\"", &|new| new.scans[1].name = Some("a/b".into())),
+        ("scans: two are called", &|new| new.scans[1].name = Some("head-00".into())),
+        ("scans: scan", &|new| new.scans[1] = NewMember { name: Some("x".into()), ..new.scans[0].clone() }),
+        ("parameters.groupwise.nothing", &|new| {
+            new.parameters.insert("groupwise.nothing".into(), json!(1));
+        }),
+        ("landmark_weights.30", &|new| {
+            new.landmark_weights.insert("30".into(), -1.0);
+        }),
+        ("vertices", &|new| new.vertices = Some(7)),
+    ];
+    for (expected, change) in cases {
+        let said = refused(change).await;
+        assert!(said.starts_with(expected), "{said}");
+    }
+    let too_many = service.jobs.submit(asked(members[..1].to_vec())).await;
+    assert!(matches!(too_many, Err(JobError::TooMany(_))));
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn the_same_key_asks_once_and_what_is_over_goes() {
+    let service = Service::start(JobSettings { keep: Some(Duration::ZERO), ..settings() }).await;
+    let members = service.upload_all(&heads(1)).await;
+    let keyed = NewRegistration { dedupe_key: Some("k".into()), ..asked(members) };
+    let (first, second) = tokio::join!(service.jobs.submit(keyed.clone()), service.jobs.submit(keyed));
+    let first = first.unwrap();
+    assert_eq!(first.id, second.unwrap().id);
+    assert!(service.ended(&first).await.expires_at.is_some());
+    tokio::time::sleep(Duration::from_millis(5)).await;
+    service.jobs.expire().await.unwrap();
+    assert!(matches!(service.jobs.get(&first.id).await, Err(JobError::NotFound(_))));
+    let kept: Vec<_> = futures_util::StreamExt::collect(service.blobs.list()).await;
+    assert_eq!(kept.len(), 2, "the scan and its landmarks");
+}
