@@ -42,7 +42,7 @@ async fn the_set_is_a_zip_of_all_results() {
     let done = finished(&server).await;
     let set = server.get(done["results"]["set"].as_str().unwrap()).await;
     let mut zip = zip::ZipArchive::new(Cursor::new(set.body)).unwrap();
-    let mut names: Vec<String> = zip.file_names().map(str::to_owned).collect();
+    let mut names: Vec<String> = zip.file_names().map(|name| name.unwrap().into_owned()).collect();
     names.sort();
     assert!(names.contains(&"manifest.json".to_owned()) && names.len() >= 6, "{names:?}");
     let mut report = Vec::new();

@@ -48,8 +48,9 @@ pub async fn ask(server: &Server, request: &Value) -> Answer {
 
 /// Waits until a registration has ended, by its events.
 pub async fn ended(server: &Server, path: &str) -> Value {
-    let events = server.get(&format!("{path}/events"));
-    let events = tokio::time::timeout(std::time::Duration::from_secs(120), events).await.unwrap();
+    let events = format!("{path}/events");
+    let limit = std::time::Duration::from_secs(120);
+    let events = tokio::time::timeout(limit, server.get(&events)).await.unwrap();
     assert_eq!(events.headers["content-type"], "text/event-stream");
     server.get(path).await.json()
 }
