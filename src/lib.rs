@@ -11,7 +11,9 @@
 //! | L2 | spatial, reparam, energy, density, formats, picture, demo | nearest points, self-intersections; u and p; the terms that are minimised; target edge lengths; files; pictures; sculpted heads |
 //! | L3 | evaluate, preflight | figures of a result on its scan and across a collection; what is wrong with scans and landmarks |
 //! | L4 | pipeline | the stages, their parameters, what they leave behind |
-//! | L5 | cli | the commands, in the program alone, which alone names clap, anyhow and indicatif |
+//! | L5 | job | what is asked for, its state, its store, its worker: one data folder; knows no HTTP |
+//! | L6 | http | routes, wire types, problems, the OpenAPI document; alone names axum and utoipa |
+//! | L7 | cli | the commands, in the program alone, which alone names clap, anyhow and indicatif |
 //!
 //! # Words
 //! | word | meaning |
@@ -48,6 +50,8 @@ pub mod density;
 pub mod energy;
 pub mod evaluate;
 pub mod formats;
+pub mod http;
+pub mod job;
 pub mod mesh;
 pub mod numeric;
 pub mod picture;

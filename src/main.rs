@@ -25,6 +25,9 @@ enum Command {
     Audit(cli::Audit),
     Demo(cli::Demo),
     Bench(cli::Bench),
+    Serve(cli::Serve),
+    Key(cli::Key),
+    Openapi(cli::Openapi),
 }
 
 fn main() -> ExitCode {
@@ -37,5 +40,8 @@ fn main() -> ExitCode {
         Command::Audit(command) => command.run(),
         Command::Demo(command) => command.run(),
         Command::Bench(command) => command.run(),
+        Command::Serve(command) => command.run(),
+        Command::Key(command) => command.run(),
+        Command::Openapi(command) => command.run(),
     }))
 }

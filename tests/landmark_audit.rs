@@ -9,7 +9,7 @@ use glam::DVec3;
 use onemesh::formats::{Scheme, read_landmarks, read_mesh};
 use onemesh::mesh::{LandmarkSet, TriangleMesh};
 use onemesh::numeric::Random;
-use onemesh::preflight::{AuditCase, Code, LandmarkAudit, audit};
+use onemesh::preflight::{AuditCase, Code, LandmarkAudit, audit, landmark_distances};
 
 /// Millimetres to a unit of the scans.
 const MILLIMETRES: f64 = 10.0;
@@ -40,10 +40,11 @@ impl Heads {
 
     /// The audit with one scan's landmarks replaced; with its surface or without.
     fn audited(&self, at: usize, landmarks: &LandmarkSet, surface: bool) -> LandmarkAudit {
+        let distances = landmark_distances(&self.meshes[at], landmarks);
         let case = |i: usize| AuditCase {
             name: &self.names[i],
             landmarks: if i == at { landmarks } else { &self.landmarks[i] },
-            mesh: (surface && i == at).then_some(&self.meshes[i]),
+            distances: (surface && i == at).then_some(&distances),
         };
         audit(&(0..self.names.len()).map(case).collect::<Vec<_>>())
     }

@@ -8,9 +8,14 @@ mod findings;
 mod fit;
 mod formats;
 mod inspect;
+mod key;
+mod logging;
+mod openapi;
 mod parameters;
 mod progress;
 mod register;
+mod serve;
+mod service_config;
 mod template;
 mod threads;
 
@@ -22,7 +27,10 @@ pub use demo::Demo;
 pub use evaluate::Evaluate;
 pub use fit::Fit;
 pub use inspect::Inspect;
+pub use key::Key;
+pub use openapi::Openapi;
 pub use register::Register;
+pub use serve::Serve;
 pub use threads::Threads;
 
 /// The exit code where some scans were left out and the others are delivered; wrong arguments have 2.

@@ -161,7 +161,8 @@ pub fn read(collection: &Path) -> anyhow::Result<Reading> {
 impl Reading {
     /// Without the scans that cannot be registered with the others, or from the template.
     fn registrable(mut self, template: Option<&Template>) -> Self {
-        let left_out = leave_out(&self.subjects, template);
+        let scans: Vec<_> = self.subjects.iter().map(|s| (s.name.as_str(), &s.landmarks)).collect();
+        let left_out = leave_out(&scans, template);
         let stays = |subject: &Subject| left_out.iter().all(|failed| failed.name != subject.name);
         let (subjects, inputs) =
             self.subjects.into_iter().zip(self.inputs).filter(|(subject, _)| stays(subject)).unzip();

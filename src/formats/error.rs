@@ -59,6 +59,12 @@ impl FormatError {
         self
     }
 
+    /// The same fault, said of `file` in place of any named before: for files whose path means nothing to the reader.
+    pub fn of_file(mut self, file: impl AsRef<Path>) -> Self {
+        self.file = Some(file.as_ref().to_owned());
+        self
+    }
+
     /// The file it is about; `None` for bytes that came without one.
     pub fn file(&self) -> Option<&Path> {
         self.file.as_deref()

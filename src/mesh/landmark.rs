@@ -3,7 +3,7 @@ use glam::DVec3;
 use super::TriangleId;
 
 /// A point on a mesh that moves with it: a triangle and the barycentric weights of its corners (sum 1).
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct SurfacePoint {
     /// The triangle it lies on.
     pub triangle: TriangleId,
@@ -21,7 +21,7 @@ where
 }
 
 /// Named landmark positions `[B, 3]` on one scan, in its own space; a missing landmark is `None`.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub struct LandmarkSet {
     /// The naming scheme, for instance `multipie68`, if one is stated.
     pub scheme: Option<String>,

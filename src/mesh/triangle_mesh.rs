@@ -5,7 +5,7 @@ use glam::DVec3;
 pub struct VertexId(pub u32);
 
 /// Index of a triangle in its mesh.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize, serde::Deserialize)]
 pub struct TriangleId(pub u32);
 
 /// Why vertices and triangles do not make a mesh.

@@ -16,7 +16,7 @@ pub enum PictureError {
 }
 
 /// Pixels `[height, width]` in eight-bit sRGB, rows from the top.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Image {
     width: usize,
     height: usize,

@@ -11,8 +11,9 @@ use crate::mesh::{SurfacePoint, components};
 use crate::numeric::Similarity;
 
 /// A template taken apart.
-pub(super) struct Parts<'a> {
-    whole: &'a Template,
+#[derive(Debug, Clone)]
+pub(super) struct Parts {
+    whole: Template,
     /// The components with landmarks, as a template of their own; all of them if none has any.
     pub main: Template,
     /// The vertices of the whole that are the main part's, in their order.
@@ -21,8 +22,8 @@ pub(super) struct Parts<'a> {
     carried: Vec<Vec<u32>>,
 }
 
-impl<'a> Parts<'a> {
-    pub fn of(whole: &'a Template) -> Self {
+impl Parts {
+    pub fn of(whole: &Template) -> Self {
         let component = components_with_triangles(whole);
         let landmark_on = |at: &SurfacePoint| component[whole.triangles[at.triangle.0 as usize][0] as usize];
         let mut is_main = vec![whole.landmarks.is_empty(); whole.positions.len() + 1];
@@ -38,7 +39,7 @@ impl<'a> Parts<'a> {
             part.push(vertex as u32);
         }
         let main = part(whole, &main_vertices);
-        Self { whole, main, main_vertices, carried: carried.into_values().collect() }
+        Self { whole: whole.clone(), main, main_vertices, carried: carried.into_values().collect() }
     }
 
     /// The whole template's positions `[N, 3]` with the main part at `main`: each other part follows by a similarity.

@@ -1,5 +1,4 @@
 use glam::DVec3;
-use rayon::prelude::*;
 
 use super::register::Subject;
 use crate::mesh::TriangleMesh;
@@ -8,23 +7,25 @@ use crate::picture::{Frame, Image, Sheet, Style, View, render};
 /// Pixels of a picture's sides.
 const SIDE: usize = 400;
 /// Most scans on one sheet; more make it larger than people look at.
-const MOST: usize = 32;
+pub const MOST_ROWS: usize = 32;
 
-/// A sheet with a row for each scan: the scan and its result with the shared triangles' edges, from the front and from
-/// the side, all of a row at one scale.
-pub fn comparison_sheet(subjects: &[Subject], results: &[TriangleMesh]) -> Image {
-    let pairs: Vec<_> = subjects.iter().zip(results).take(MOST).collect();
-    let title = match subjects.len() - pairs.len() {
+/// A scan and its result with the shared triangles' edges, from the front and from the side, all at one scale; each
+/// picture with what it is called.
+pub type ComparisonRow = Vec<(String, Image)>;
+
+/// A sheet with a row for each scan, and how many more there are.
+pub fn comparison_sheet(rows: Vec<ComparisonRow>, scans: usize) -> Image {
+    let title = match scans.saturating_sub(rows.len()) {
         0 => "scan and result".to_owned(),
         more => format!("scan and result, and {more} more"),
     };
-    let rows: Vec<_> = pairs.into_par_iter().map(|(subject, result)| row(subject, result)).collect();
     let mut sheet = Sheet::new(title);
     rows.into_iter().for_each(|tiles| sheet.row(tiles));
     sheet.image()
 }
 
-fn row(subject: &Subject, result: &TriangleMesh) -> Vec<(String, Image)> {
+/// The row of a scan.
+pub fn comparison_row(subject: &Subject, result: &TriangleMesh) -> ComparisonRow {
     let frame = frame(&subject.mesh);
     let picture = |mesh: &TriangleMesh, view: View, style: &Style| {
         render(mesh, &view.sized(SIDE, SIDE).framed(frame), style)

@@ -1,12 +1,16 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
+use super::package::{REPORT, SHEET, program};
 use super::settings::Settings;
 use super::template::Template;
 use crate::formats::{InputFile, Sha256};
 use crate::mesh::SurfacePoint;
+
+/// Version of this record.
+const RECORD: u32 = 2;
 
 /// What a folder of results was made from and holds; the same inputs and settings give the same manifest.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -41,7 +45,7 @@ pub struct TemplateEntry {
 }
 
 /// A landmark on the shared triangles.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct LandmarkEntry {
     /// Its triangle.
     pub triangle: u32,
@@ -50,7 +54,7 @@ pub struct LandmarkEntry {
 }
 
 /// One scan and its result.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ScanEntry {
     /// The scan's name.
     pub name: String,
@@ -61,7 +65,7 @@ pub struct ScanEntry {
 }
 
 /// A file that was written.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct OutputEntry {
     /// Its name.
     pub file: String,
@@ -70,7 +74,7 @@ pub struct OutputEntry {
 }
 
 /// A file that was read.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct InputEntry {
     /// Its path, from the collection's folder where it lies within.
     pub file: String,
@@ -78,6 +82,21 @@ pub struct InputEntry {
     pub size: u64,
     /// The digest of its bytes.
     pub sha256: Sha256,
+}
+
+impl Manifest {
+    /// What is told of scans that were registered with these settings.
+    pub fn of(settings: &Settings, template: &Template, scans: Vec<ScanEntry>) -> Self {
+        Self {
+            record: RECORD,
+            program: program(),
+            settings: settings.clone(),
+            template: TemplateEntry::of(template),
+            scans,
+            report: REPORT.to_owned(),
+            sheet: SHEET.to_owned(),
+        }
+    }
 }
 
 impl TemplateEntry {

@@ -2,13 +2,14 @@
 
 use std::collections::HashMap;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
-use super::register::{LEAST_LANDMARKS, Subject};
+use super::register::LEAST_LANDMARKS;
 use super::template::Template;
+use crate::mesh::LandmarkSet;
 
 /// A scan that is left out of a registration, and why.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct FailedScan {
     /// Its name.
     pub name: String,
@@ -21,10 +22,10 @@ pub struct FailedScan {
 /// From a `template` each scan needs [`LEAST_LANDMARKS`] of its landmarks. Without one, that many must be on all scans:
 /// as long as they are not, the scan goes that shares as many with the fewest others; of several, that which shares the
 /// fewest landmarks with all others in sum, then the last. One scan stays in any case if it has enough itself.
-pub fn leave_out(subjects: &[Subject], template: Option<&Template>) -> Vec<FailedScan> {
-    let sets = landmark_sets(subjects, template);
+pub fn leave_out(scans: &[(&str, &LandmarkSet)], template: Option<&Template>) -> Vec<FailedScan> {
+    let sets = landmark_sets(scans, template);
     let mut problems: Vec<Option<String>> = sets.iter().map(|set| too_few(set, template)).collect();
-    let mut kept: Vec<usize> = (0..subjects.len()).filter(|&at| problems[at].is_none()).collect();
+    let mut kept: Vec<usize> = (0..scans.len()).filter(|&at| problems[at].is_none()).collect();
     while template.is_none() && kept.len() > 1 && shared_by_all(&sets, &kept) < LEAST_LANDMARKS {
         let stranger = kept.remove(strangest(&sets, &kept));
         let partners = partners(&sets, stranger, &kept);
@@ -34,22 +35,22 @@ pub fn leave_out(subjects: &[Subject], template: Option<&Template>) -> Vec<Faile
             kept.len()
         ));
     }
-    let failed = |(subject, problem): (&Subject, Option<String>)| {
-        Some(FailedScan { name: subject.name.clone(), problem: problem? })
+    let failed = |((name, _), problem): (&(&str, _), Option<String>)| {
+        Some(FailedScan { name: (*name).to_owned(), problem: problem? })
     };
-    subjects.iter().zip(problems).filter_map(failed).collect()
+    scans.iter().zip(problems).filter_map(failed).collect()
 }
 
 /// Which landmarks a scan has, a bit for each.
 type LandmarkBits = Vec<u64>;
 
 /// The landmarks of each scan; with a template, those that it has too.
-fn landmark_sets(subjects: &[Subject], template: Option<&Template>) -> Vec<LandmarkBits> {
+fn landmark_sets(scans: &[(&str, &LandmarkSet)], template: Option<&Template>) -> Vec<LandmarkBits> {
     let counts = |name: &str| template.is_none_or(|template| template.landmarks.contains_key(name));
     let mut numbers: HashMap<&str, usize> = HashMap::new();
     let mut own: Vec<Vec<usize>> = Vec::new();
-    for subject in subjects {
-        let names = subject.landmarks.present().map(|(name, _)| name).filter(|name| counts(name));
+    for (_, landmarks) in scans {
+        let names = landmarks.present().map(|(name, _)| name).filter(|name| counts(name));
         let number = |name| {
             let next = numbers.len();
             *numbers.entry(name).or_insert(next)
@@ -104,24 +105,17 @@ fn strangest(sets: &[LandmarkBits], kept: &[usize]) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::{LandmarkSet, TriangleMesh};
     use glam::DVec3;
 
-    fn subject(name: &str, landmarks: &[&str]) -> Subject {
-        let mesh = TriangleMesh::new(vec![DVec3::ZERO, DVec3::X, DVec3::Y], vec![[0, 1, 2]]).unwrap();
-        let names: Vec<String> = landmarks.iter().map(|&name| name.to_owned()).collect();
-        let points = vec![Some(DVec3::ZERO); names.len()];
-        Subject {
-            name: name.to_owned(),
-            mesh,
-            landmarks: LandmarkSet { scheme: None, names, points },
-            mask: None,
-        }
+    fn landmarks(names: &[&str]) -> LandmarkSet {
+        let names: Vec<String> = names.iter().map(|&name| name.to_owned()).collect();
+        LandmarkSet { scheme: None, points: vec![Some(DVec3::ZERO); names.len()], names }
     }
 
-    fn left_out(subjects: &[(&str, &[&str])]) -> Vec<String> {
-        let subjects: Vec<Subject> = subjects.iter().map(|(name, own)| subject(name, own)).collect();
-        leave_out(&subjects, None).into_iter().map(|failed| failed.name).collect()
+    fn left_out(scans: &[(&str, &[&str])]) -> Vec<String> {
+        let sets: Vec<LandmarkSet> = scans.iter().map(|(_, own)| landmarks(own)).collect();
+        let scans: Vec<_> = scans.iter().zip(&sets).map(|((name, _), set)| (*name, set)).collect();
+        leave_out(&scans, None).into_iter().map(|failed| failed.name).collect()
     }
 
     const ALL: &[&str] = &["a", "b", "c", "d", "e"];
@@ -167,9 +161,10 @@ mod tests {
                 frozen: false,
             }
         };
-        let subjects = [subject("1", &["a", "b", "c"]), subject("2", &["c", "d", "e"])];
-        assert!(leave_out(&subjects, Some(&template(ALL))).is_empty());
-        let failed = leave_out(&subjects, Some(&template(&["a", "b", "c"])));
+        let [one, two] = [landmarks(&["a", "b", "c"]), landmarks(&["c", "d", "e"])];
+        let scans = [("1", &one), ("2", &two)];
+        assert!(leave_out(&scans, Some(&template(ALL))).is_empty());
+        let failed = leave_out(&scans, Some(&template(&["a", "b", "c"])));
         assert_eq!(failed.len(), 1);
         assert!(failed[0].problem.contains("has 1 of the template's landmarks"), "{failed:?}");
     }

@@ -8,27 +8,29 @@ use std::time::Instant;
 
 use glam::DVec3;
 use rayon::prelude::*;
-use serde_json::{Value, json};
 
-use super::comparison::comparison_sheet;
+use super::comparison::{ComparisonRow, MOST_ROWS, comparison_row, comparison_sheet};
 use super::frozen::{FrozenCollection, FrozenError};
-use super::manifest::{InputEntry, Manifest, OutputEntry, ScanEntry, TemplateEntry};
+use super::manifest::{InputEntry, Manifest, OutputEntry, ScanEntry};
 use super::membership::FailedScan;
-use super::output::{OutputFormat, Outputs, ResultMesh};
+use super::output::{OutputFormat, Outputs};
 use super::precheck::Precheck;
 use super::register::{Registration, Subject};
-use super::report::{Report, ScanReport, position};
+use super::report::{Report, ScanReport};
+use super::scan_result::ScanResult;
 use super::settings::Settings;
 use crate::formats::{FormatError, InputFile, Sha256, write_whole};
 use crate::mesh::{MeshError, TriangleMesh};
 use crate::picture::PictureError;
 
-/// Version of manifest and report.
-const RECORD: u32 = 2;
-const MANIFEST: &str = "manifest.json";
-const REPORT: &str = "report.json";
-const SHEET: &str = "sheet.png";
-const TEMPLATE: &str = "template.frozen.glb";
+/// What the files of a set are called, beside those of its scans.
+pub const MANIFEST: &str = "manifest.json";
+/// How well it went.
+pub const REPORT: &str = "report.json";
+/// Pictures.
+pub const SHEET: &str = "sheet.png";
+/// What further scans are registered from.
+pub const TEMPLATE: &str = "template.frozen.glb";
 /// The files that are not of one scan.
 const OWN: [&str; 4] = [MANIFEST, REPORT, SHEET, TEMPLATE];
 
@@ -115,65 +117,48 @@ impl Package<'_> {
         fs::create_dir_all(folder)
             .map_err(|error| PackageError::Folder { path: folder.to_owned(), error })?;
         spare_inputs(folder, self.subjects, self.inputs, &self.outputs)?;
-        let results = self.results()?;
-        let scans = self
-            .subjects
-            .par_iter()
-            .zip(self.prechecks)
-            .zip(&results)
-            .zip(&self.registration.confidence)
-            .map(|(((subject, precheck), result), confidence)| {
-                let report =
-                    ScanReport::of(subject, precheck, result, confidence, &self.registration.template);
-                let outputs = self.write_outputs(folder, subject, result, &report, confidence)?;
-                Ok((report, outputs))
-            })
-            .collect::<Result<Vec<_>, PackageError>>()?;
+        let scans = (0..self.subjects.len()).into_par_iter().map(|at| self.write_scan(folder, at));
+        let scans = scans.collect::<Result<Vec<_>, PackageError>>()?;
         self.copy_companions(folder)?;
         let Registration { template, .. } = self.registration;
         let frozen = FrozenCollection { template: template.clone(), settings: self.settings.clone() };
         write_whole(folder.join(TEMPLATE), &frozen.glb_bytes()?)?;
-        write_whole(folder.join(SHEET), &comparison_sheet(self.subjects, &results).png_bytes()?)?;
-        let (scans, outputs): (Vec<_>, Vec<_>) = scans.into_iter().unzip();
-        let seconds = self.seconds(start.elapsed().as_secs_f64());
-        let failed = self.failed.to_vec();
-        let report = Report { record: RECORD, program: program(), seconds, scans, failed };
-        write_json(&folder.join(REPORT), &report)?;
-        write_json(&folder.join(MANIFEST), &self.manifest(outputs))?;
+        let (mut reports, mut entries, mut rows) = (Vec::new(), Vec::new(), Vec::new());
+        for (report, entry, row) in scans {
+            reports.push(report);
+            entries.push(entry);
+            rows.extend(row);
+        }
+        write_whole(folder.join(SHEET), &comparison_sheet(rows, self.subjects.len()).png_bytes()?)?;
+        let report = Report::of(self.seconds(start.elapsed().as_secs_f64()), reports, self.failed.to_vec());
+        write_whole(folder.join(REPORT), &record_bytes(&report))?;
+        let manifest = Manifest::of(self.settings, template, entries);
+        write_whole(folder.join(MANIFEST), &record_bytes(&manifest))?;
         Ok(report)
     }
 
-    fn results(&self) -> Result<Vec<TriangleMesh>, PackageError> {
-        let Registration { template, members, .. } = self.registration;
-        let result = |(subject, positions): (&Subject, &Vec<DVec3>)| {
-            TriangleMesh::new(positions.clone(), template.triangles.clone())
-                .map_err(|error| PackageError::Result { name: subject.name.clone(), error })
-        };
-        self.subjects.iter().zip(members).map(result).collect()
-    }
-
-    fn write_outputs(
+    fn write_scan(
         &self,
         folder: &Path,
-        subject: &Subject,
-        result: &TriangleMesh,
-        report: &ScanReport,
-        confidence: &[f32],
-    ) -> Result<Vec<OutputEntry>, FormatError> {
-        let confidence: Vec<f64> = confidence.iter().copied().map(f64::from).collect();
-        let mesh = ResultMesh {
-            name: &subject.name,
-            mesh: result,
-            texture_coordinates: self.registration.template.texture_coordinates.as_deref(),
-            figures: vec![("residual", &report.fidelity.residuals), ("confidence", &confidence)],
-            extras: self.extras(result),
-        };
+        at: usize,
+    ) -> Result<(ScanReport, ScanEntry, Option<ComparisonRow>), PackageError> {
+        let Registration { template, members, confidence, .. } = self.registration;
+        let (subject, confidence) = (&self.subjects[at], &confidence[at]);
+        let result = ScanResult::of(subject, &self.prechecks[at], template, &members[at], confidence)?;
         let write = |(format, file): (OutputFormat, String)| {
-            let bytes = mesh.bytes(format, self.outputs.source).map_err(|error| error.in_file(&file))?;
+            let bytes = result.bytes(format, self.outputs.source).map_err(|error| error.in_file(&file))?;
             write_whole(folder.join(&file), &bytes)?;
             Ok(OutputEntry { file, sha256: Sha256::of(&bytes) })
         };
-        self.outputs.files(&subject.name).into_iter().map(write).collect()
+        let outputs: Result<Vec<OutputEntry>, PackageError> =
+            self.outputs.files(&subject.name).into_iter().map(write).collect();
+        let entry = ScanEntry {
+            name: subject.name.clone(),
+            inputs: self.inputs[at].iter().map(|input| InputEntry::of(input, self.root)).collect(),
+            outputs: outputs?,
+        };
+        let row = (at < MOST_ROWS).then(|| comparison_row(subject, &result.mesh));
+        Ok((result.report, entry, row))
     }
 
     /// Copies what results in the template's own format name to where they look for it; what is there already stays.
@@ -197,40 +182,10 @@ impl Package<'_> {
         Ok(())
     }
 
-    /// The template's landmarks on a result, as landmark files have them and with their places on the triangles.
-    fn extras(&self, result: &TriangleMesh) -> Value {
-        let landmarks = self.registration.template.landmarks.iter().map(|(name, at)| {
-            let on_result = position(result, at).to_array();
-            json!({ "name": name, "position": on_result, "triangle": at.triangle.0, "weights": at.weights })
-        });
-        let landmarks: Vec<Value> = landmarks.collect();
-        match &self.registration.template.scheme {
-            Some(scheme) => json!({ "scheme": scheme, "landmarks": landmarks }),
-            None => json!({ "landmarks": landmarks }),
-        }
-    }
-
     fn seconds(&self, writing: f64) -> BTreeMap<String, f64> {
         let stages = self.registration.seconds.iter().map(|(stage, &seconds)| (stage.to_string(), seconds));
         let around = [("read", self.reading), ("write", writing)];
         stages.chain(around.map(|(name, seconds)| (name.to_owned(), seconds))).collect()
-    }
-
-    fn manifest(&self, outputs: Vec<Vec<OutputEntry>>) -> Manifest {
-        let entry = |((subject, inputs), outputs): ((&Subject, &Vec<InputFile>), _)| ScanEntry {
-            name: subject.name.clone(),
-            inputs: inputs.iter().map(|input| InputEntry::of(input, self.root)).collect(),
-            outputs,
-        };
-        Manifest {
-            record: RECORD,
-            program: program(),
-            settings: self.settings.clone(),
-            template: TemplateEntry::of(&self.registration.template),
-            scans: self.subjects.iter().zip(self.inputs).zip(outputs).map(entry).collect(),
-            report: REPORT.to_owned(),
-            sheet: SHEET.to_owned(),
-        }
     }
 }
 
@@ -264,14 +219,16 @@ fn is_same(one: &Path, other: &Path) -> bool {
     matches!((fs::canonicalize(one), fs::canonicalize(other)), (Ok(one), Ok(other)) if one == other)
 }
 
-fn program() -> String {
+/// The program and its version, as records state it.
+pub(super) fn program() -> String {
     format!("onemesh {}", env!("CARGO_PKG_VERSION"))
 }
 
-fn write_json(path: &Path, record: &impl serde::Serialize) -> Result<(), FormatError> {
-    let mut text = serde_json::to_string_pretty(record).expect("records are plain numbers and names");
-    text.push('\n');
-    write_whole(path, text.as_bytes())
+/// A manifest or report as its file has it.
+pub fn record_bytes(record: &impl serde::Serialize) -> Vec<u8> {
+    let mut text = serde_json::to_vec_pretty(record).expect("records are plain numbers and names");
+    text.push(b'\n');
+    text
 }
 
 /// Area-weighted vertex normals `[N, 3]`, not of unit length.

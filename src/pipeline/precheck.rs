@@ -1,11 +1,16 @@
+use std::collections::BTreeMap;
+
 use rayon::prelude::*;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::register::Subject;
-use crate::preflight::{AuditCase, Code, Finding, Inspection, LandmarkAudit, ScanAudit, audit};
+use crate::mesh::LandmarkSet;
+use crate::preflight::{
+    AuditCase, Code, Finding, Inspection, LandmarkAudit, ScanAudit, audit, landmark_distances,
+};
 
 /// What is known of a scan before it is registered.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Precheck {
     /// What is wrong or worth knowing, the worst first.
     pub findings: Vec<Finding>,
@@ -16,44 +21,77 @@ pub struct Precheck {
     pub largest_part: f64,
 }
 
+/// What is seen of a scan by itself, for the [`Precheck`] beside the others.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Inspected {
+    /// What is known without the others.
+    pub alone: Precheck,
+    /// Its landmarks.
+    pub landmarks: LandmarkSet,
+    /// How far each lies from the surface.
+    pub distances: BTreeMap<String, f64>,
+}
+
+impl Inspected {
+    /// Looks at a scan.
+    pub fn of(subject: &Subject) -> Self {
+        let Subject { mesh, landmarks, .. } = subject;
+        let alone = Precheck::alone(Inspection::new(mesh, Some(landmarks)));
+        Self { alone, landmarks: landmarks.clone(), distances: landmark_distances(mesh, landmarks) }
+    }
+
+    fn case<'a>(&'a self, name: &'a str) -> AuditCase<'a> {
+        AuditCase { name, landmarks: &self.landmarks, distances: Some(&self.distances) }
+    }
+}
+
 /// Looks at all scans of a collection, each by itself and their landmarks beside each other; in their order.
 pub fn precheck(subjects: &[Subject]) -> Vec<Precheck> {
-    let inspect = |subject: &Subject| Inspection::new(&subject.mesh, Some(&subject.landmarks));
-    let inspections: Vec<Inspection> = subjects.par_iter().map(inspect).collect();
-    inspections
-        .into_iter()
-        .zip(audit_landmarks(subjects).scans)
-        .map(|(inspection, audited)| Precheck::new(inspection, audited))
-        .collect()
+    let inspected: Vec<Inspected> = subjects.par_iter().map(Inspected::of).collect();
+    let named: Vec<_> = subjects.iter().map(|subject| subject.name.as_str()).zip(&inspected).collect();
+    precheck_inspected(&named).0
+}
+
+/// Holds the scans of a collection, by their names, beside each other; in their order.
+pub fn precheck_inspected(scans: &[(&str, &Inspected)]) -> (Vec<Precheck>, LandmarkAudit) {
+    let cases: Vec<AuditCase> = scans.iter().map(|(name, inspected)| inspected.case(name)).collect();
+    let audit = audit(&cases);
+    let beside =
+        |((_, inspected), audited): (&(&str, &Inspected), &ScanAudit)| inspected.alone.beside(audited);
+    (scans.iter().zip(&audit.scans).map(beside).collect(), audit)
 }
 
 /// Holds the landmarks of a collection against each other and against their scans.
 pub fn audit_landmarks(subjects: &[Subject]) -> LandmarkAudit {
-    let cases = subjects.iter().map(|Subject { name, mesh, landmarks, .. }| AuditCase {
-        name,
-        landmarks,
-        mesh: Some(mesh),
+    let distances = |subject: &Subject| landmark_distances(&subject.mesh, &subject.landmarks);
+    let distances: Vec<_> = subjects.par_iter().map(distances).collect();
+    let cases = subjects.iter().zip(&distances).map(|(Subject { name, landmarks, .. }, distances)| {
+        AuditCase { name, landmarks, distances: Some(distances) }
     });
     audit(&cases.collect::<Vec<_>>())
 }
 
 impl Precheck {
-    fn new(inspection: Inspection, audited: ScanAudit) -> Self {
+    fn alone(inspection: Inspection) -> Self {
         let Inspection { non_manifold_edges, opposed_edges, degenerate_triangles, .. } = inspection;
         let damaged =
             non_manifold_edges + opposed_edges + degenerate_triangles + inspection.duplicate_triangles;
         let largest = inspection.components.first().map_or(0.0, |part| part.area);
-        // The other scans judge landmarks better than the scan does alone.
-        let judged = !audited.strangeness.is_empty() || !audited.findings.is_empty();
-        let alone = inspection.findings.into_iter().filter(|f| !(judged && judges_places(f.code)));
-        let mut findings: Vec<Finding> = alone.chain(audited.findings).collect();
-        // Stable: findings of one severity stay in their order.
-        findings.sort_by_key(|finding| std::cmp::Reverse(finding.severity));
         Self {
-            findings,
+            findings: inspection.findings,
             damage: damaged as f64 / inspection.triangles as f64,
             largest_part: if inspection.area > 0.0 { largest / inspection.area } else { 0.0 },
         }
+    }
+
+    fn beside(&self, audited: &ScanAudit) -> Self {
+        // The other scans judge landmarks better than the scan does alone.
+        let judged = !audited.strangeness.is_empty() || !audited.findings.is_empty();
+        let alone = self.findings.iter().filter(|f| !(judged && judges_places(f.code)));
+        let mut findings: Vec<Finding> = alone.chain(&audited.findings).cloned().collect();
+        // Stable: findings of one severity stay in their order.
+        findings.sort_by_key(|finding| std::cmp::Reverse(finding.severity));
+        Self { findings, ..*self }
     }
 }
 

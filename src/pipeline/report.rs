@@ -5,6 +5,7 @@ use serde::Serialize;
 
 use super::carried::matched_triangles;
 use super::membership::FailedScan;
+use super::package::program;
 use super::precheck::Precheck;
 use super::register::Subject;
 use super::template::Template;
@@ -12,9 +13,12 @@ use super::verdict::{Reason, Verdict};
 use crate::evaluate::Fidelity;
 use crate::mesh::{SurfacePoint, TriangleMesh};
 
+/// Version of this record.
+const RECORD: u32 = 2;
+
 /// How well a registration went; but for the seconds, the same inputs and settings give the same report.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Report {
+pub struct Report<S = ScanReport> {
     /// Version of this record.
     pub record: u32,
     /// The program and its version.
@@ -22,7 +26,7 @@ pub struct Report {
     /// Wall-clock seconds of each stage, of reading and of writing.
     pub seconds: BTreeMap<String, f64>,
     /// The scans in their order.
-    pub scans: Vec<ScanReport>,
+    pub scans: Vec<S>,
     /// The scans that were left out.
     pub failed: Vec<FailedScan>,
 }
@@ -79,6 +83,13 @@ impl ScanReport {
         report.reasons = Reason::all_of(&report);
         report.verdict = report.reasons.first().map_or(Verdict::Pass, |worst| worst.verdict);
         report
+    }
+}
+
+impl<S> Report<S> {
+    /// The report on scans that were registered, and on those that were left out.
+    pub fn of(seconds: BTreeMap<String, f64>, scans: Vec<S>, failed: Vec<FailedScan>) -> Self {
+        Self { record: RECORD, program: program(), seconds, scans, failed }
     }
 }
 

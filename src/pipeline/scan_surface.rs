@@ -102,6 +102,12 @@ impl ScanSurface {
         }
     }
 
+    /// About as many bytes as it takes: positions, normals, samples, and an index of the triangles.
+    pub fn bytes(&self) -> usize {
+        let triangles = self.index.triangles().len();
+        36 * self.positions.len() + 160 * triangles + size_of::<SurfaceSample>() * self.samples.len()
+    }
+
     /// From the scan's space to unit space.
     pub fn to_unit(&self, point: DVec3) -> Vec3A {
         (self.rotation * (point - self.centre) / self.radius).as_vec3a()

@@ -8,7 +8,7 @@ use crate::mesh::{LandmarkSet, SurfacePoint, TriangleId, sphere_layout};
 use crate::spatial::SurfaceIndex;
 
 /// What registered scans share: a shape's triangles, and where the landmarks lie on them.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub struct Template {
     /// The shape `[N, 3]`: a collection's mean in unit space, the bare sphere, or a user's mesh in its own space.
     pub positions: Vec<DVec3>,

@@ -1,11 +1,9 @@
 //! Scans registered from a given template: a user's own mesh, or that of an earlier collection.
 
-use std::collections::BTreeMap;
-use std::sync::Arc;
-use std::time::Instant;
+use std::sync::{Arc, OnceLock};
 
 use glam::{DVec3, Vec3A};
-use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use super::carried::Parts;
 use super::confidence::confidence;
@@ -14,119 +12,158 @@ use super::groupwise::{Member, RestShape, mean_shape, register_member};
 use super::known::known;
 use super::landmark_weights::LandmarkWeights;
 use super::laying::laid;
-use super::mask::check_mask;
 use super::observer::{Observer, Stage, Watch};
-use super::register::{
-    LEAST_LANDMARKS, RegisterError, Registration, SAMPLES, Subject, check_masks, moved_onto,
-};
+use super::plan::PlanStage;
+use super::register::{LEAST_LANDMARKS, RegisterError, SAMPLES, Subject, moved_onto};
 use super::scan_surface::ScanSurface;
 use super::settings::Settings;
+use super::sphere_course::contributions;
+use super::state::{Contribution, Mean, Placed, ScanState, SharedState};
 use super::template::Template;
 use crate::energy::LandmarkPull;
 use crate::mesh::SurfacePoint;
 use crate::numeric::Similarity;
 
-/// Registers every scan from the template, by the landmarks that it has in common with the template.
-///
-/// The template is laid on each scan by the similarity of those landmarks and then deformed by the energies of the
-/// groupwise stage, from stiff to soft. In further rounds the mean of the results takes the template's place; not if the
-/// template is frozen: then a scan's result is the same whatever else is registered.
-///
-/// Components of the template that carry no landmark, eyeballs for instance, are matched to nothing: each follows the
-/// others around it and keeps its shape.
-///
-/// # Errors
-/// [`RegisterError`] for an empty collection, a scan with too few of the template's landmarks, or a request to stop.
-pub fn register_to(
-    template: &Template,
-    subjects: &[Subject],
-    settings: &Settings,
-    observer: &dyn Observer,
-) -> Result<Registration, RegisterError> {
-    if subjects.is_empty() {
-        return Err(RegisterError::Empty);
-    }
-    check_masks(subjects)?;
-    let mask = template.mask.as_ref().map_or(Ok(()), |mask| check_mask(mask, template.positions.len()));
-    mask.map_err(RegisterError::TemplateMask)?;
-    let start = Instant::now();
-    let parts = Parts::of(template);
-    let mut registration = register_main(&parts.main, subjects, settings, observer)?;
-    registration.members = registration.members.iter().map(|member| parts.carry(member)).collect();
-    registration.confidence = registration.confidence.iter().map(|main| parts.confidence(main)).collect();
-    let positions = parts.carry(&registration.template.positions);
-    registration.template = Template { positions, ..template.clone() };
-    registration.seconds = BTreeMap::from([(Stage::Register, start.elapsed().as_secs_f64())]);
-    Ok(registration)
+/// How scans are registered from a template.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct TemplateCourse {
+    /// Every parameter.
+    pub(super) settings: Settings,
+    template: Template,
+    /// How often scans are registered; each time but the first from the mean of the time before.
+    rounds: usize,
+    /// How much each landmark counts.
+    pub(super) weights: LandmarkWeights,
+    #[serde(skip)]
+    matched: OnceLock<Arc<Matched>>,
 }
 
-/// Registers what is matched to the scans.
-fn register_main(
-    template: &Template,
-    subjects: &[Subject],
-    settings: &Settings,
-    observer: &dyn Observer,
-) -> Result<Registration, RegisterError> {
-    let rest: Vec<Vec3A> = template.positions.iter().map(|p| p.as_vec3a()).collect();
-    let connectivity = Arc::new(Connectivity::new(&rest, &template.triangles));
-    let weights = LandmarkWeights::of(subjects, settings);
-    let lay = |(number, subject)| Laid::of(template, subject, |names: &[&str]| weights.on(number, names));
-    let members: Vec<Laid> = subjects.par_iter().enumerate().map(lay).collect::<Result<_, _>>()?;
-    let scans: Vec<&ScanSurface> = members.iter().map(|member| &member.scan).collect();
-    let settings = &settings.transfer;
-    let rounds = if template.frozen || subjects.len() == 1 { 1 } else { settings.rounds.max(1) };
-    let per_round = settings.phases * settings.iterations;
-    let mut template = template.clone();
-    let mut shapes: Vec<Vec<Vec3A>> = members.iter().map(|member| member.start.clone()).collect();
-    for round in 0..rounds {
-        if round > 0 {
-            let known = known(&connectivity, &scans, &shapes);
-            let mean = mean_shape(&shapes, &vec![1.0; shapes.len()], &known);
-            shapes =
-                shapes.iter().zip(&known).map(|(shape, known)| moved_onto(&mean, shape, known)).collect();
-            template.positions = mean.iter().map(|p| p.as_dvec3()).collect();
-        }
-        let one = |(member, start): (&Laid, Vec<Vec3A>)| {
-            let iterations = per_round * rounds;
-            let watch = Watch { observer, stage: Stage::Register, scan: member.name, iterations };
-            let rest = RestShape::new(connectivity.clone(), start.clone()).masked(template.mask.as_deref());
-            let member = Member { scan: &member.scan, landmarks: &member.pulls, start };
-            register_member(&rest, member, settings, &watch, round * per_round)
-        };
-        shapes = members.par_iter().zip(shapes).map(one).collect::<Result<_, _>>()?;
+/// What of a template is matched to scans.
+struct Matched {
+    parts: Parts,
+    connectivity: Arc<Connectivity>,
+}
+
+impl std::fmt::Debug for Matched {
+    fn fmt(&self, out: &mut std::fmt::Formatter) -> std::fmt::Result {
+        out.debug_struct("Matched").finish_non_exhaustive()
     }
-    let confidence = (scans.par_iter().zip(&shapes))
-        .map(|(scan, shape)| {
-            let mut confidence = confidence(scan, &connectivity.topology, shape);
-            for (confidence, taken) in confidence.iter_mut().zip(template.mask.iter().flatten()) {
-                *confidence *= taken;
-            }
-            confidence
-        })
-        .collect();
-    let back = |(member, shape): (&Laid, Vec<Vec3A>)| shape.iter().map(|p| member.scan.to_scan(*p)).collect();
-    let members = members.iter().zip(shapes).map(back).collect();
-    Ok(Registration { template, members, confidence, seconds: BTreeMap::new() })
 }
 
 /// A scan with the template laid on it.
-struct Laid<'a> {
-    name: &'a str,
-    scan: ScanSurface,
+pub struct Laid {
+    name: String,
+    pub(super) scan: ScanSurface,
     pulls: Vec<LandmarkPull>,
     /// The template in the scan's unit space `[N, 3]`.
-    start: Vec<Vec3A>,
+    pub(super) start: Vec<Vec3A>,
 }
 
-impl<'a> Laid<'a> {
+impl TemplateCourse {
+    pub(super) fn new(template: &Template, scans: usize, settings: &Settings) -> Self {
+        let rounds = if template.frozen || scans == 1 { 1 } else { settings.transfer.rounds.max(1) };
+        let (settings, template) = (settings.clone(), template.clone());
+        let weights = LandmarkWeights::default();
+        Self { settings, template, rounds, weights, matched: OnceLock::new() }
+    }
+
+    pub(super) fn stages(&self) -> Vec<PlanStage> {
+        let rounds = (1..self.rounds).flat_map(|round| [PlanStage::Mean(round), PlanStage::Round(round)]);
+        std::iter::once(PlanStage::Round(0)).chain(rounds).collect()
+    }
+
+    fn matched(&self) -> &Matched {
+        self.matched.get_or_init(|| {
+            let parts = Parts::of(&self.template);
+            let rest: Vec<Vec3A> = parts.main.positions.iter().map(|p| p.as_vec3a()).collect();
+            let connectivity = Arc::new(Connectivity::new(&rest, &parts.main.triangles));
+            Arc::new(Matched { parts, connectivity })
+        })
+    }
+
+    pub(super) fn prepare(&self, subject: &Subject) -> Result<Laid, RegisterError> {
+        Laid::of(&self.matched().parts.main, subject, &self.weights)
+    }
+
+    pub(super) fn scan_step(
+        &self,
+        stage: PlanStage,
+        scan: &Laid,
+        own: Option<&ScanState>,
+        shared: Option<&SharedState>,
+        observer: &dyn Observer,
+    ) -> Result<ScanState, RegisterError> {
+        let (round, start) = match (stage, own, shared) {
+            (PlanStage::Round(0), None, None) => (0, scan.start.clone()),
+            (PlanStage::Round(round), Some(ScanState::Shaped(own)), Some(SharedState::Mean(mean))) => {
+                (round, moved_onto(&mean.positions, &own.shape, &own.known))
+            }
+            _ => return Err(RegisterError::State),
+        };
+        let settings = &self.settings.transfer;
+        let per_round = settings.phases * settings.iterations;
+        let iterations = per_round * self.rounds;
+        let watch = Watch { observer, stage: Stage::Register, scan: &scan.name, iterations };
+        let Matched { parts, connectivity } = self.matched();
+        let mask = parts.main.mask.as_deref();
+        let rest = RestShape::new(connectivity.clone(), start.clone()).masked(mask);
+        let member = Member { scan: &scan.scan, landmarks: &scan.pulls, start };
+        let shape = register_member(&rest, member, settings, &watch, round * per_round)?;
+        Ok(self.after(round + 1, &scan.scan, shape))
+    }
+
+    /// The state of a scan before a round, or when all are over, from its shape in unit space.
+    fn after(&self, round: usize, scan: &ScanSurface, shape: Vec<Vec3A>) -> ScanState {
+        let Matched { parts, connectivity } = self.matched();
+        if round < self.rounds {
+            let known = known(connectivity, scan, &shape);
+            return ScanState::Shaped(Contribution { shape, known, weight: 1.0, need: Vec::new() });
+        }
+        let mut confidence = confidence(scan, &connectivity.topology, &shape);
+        for (confidence, taken) in confidence.iter_mut().zip(parts.main.mask.iter().flatten()) {
+            *confidence *= taken;
+        }
+        let main: Vec<DVec3> = shape.into_iter().map(|p| scan.to_scan(p)).collect();
+        ScanState::Placed(Placed { positions: parts.carry(&main), confidence: parts.confidence(&confidence) })
+    }
+
+    pub(super) fn shared_step(
+        &self,
+        stage: PlanStage,
+        scans: &[ScanState],
+    ) -> Result<SharedState, RegisterError> {
+        let members = contributions(scans)?;
+        if !matches!(stage, PlanStage::Mean(_)) {
+            return Err(RegisterError::State);
+        }
+        let shapes: Vec<&[Vec3A]> = members.iter().map(|member| &member.shape[..]).collect();
+        let known: Vec<&[f64]> = members.iter().map(|member| &member.known[..]).collect();
+        let weights: Vec<f64> = members.iter().map(|member| member.weight).collect();
+        let positions = mean_shape(&shapes, &weights, &known);
+        Ok(SharedState::Mean(Mean { level: 0, positions, points: Vec::new(), moved: Vec::new() }))
+    }
+
+    pub(super) fn template(&self, shared: Option<&SharedState>) -> Result<Template, RegisterError> {
+        let parts = &self.matched().parts;
+        let main: Vec<DVec3> = match shared {
+            None => parts.main.positions.clone(),
+            Some(SharedState::Mean(mean)) => mean.positions.iter().map(|p| p.as_dvec3()).collect(),
+            Some(SharedState::OnSphere(_)) => return Err(RegisterError::State),
+        };
+        Ok(Template { positions: parts.carry(&main), ..self.template.clone() })
+    }
+}
+
+impl Laid {
     /// Lays the template on a scan by the landmarks that both have, which count as `weights` says of their names.
     fn of(
         template: &Template,
-        subject: &'a Subject,
-        weights: impl FnOnce(&[&str]) -> Vec<f64>,
+        subject: &Subject,
+        weights: &LandmarkWeights,
     ) -> Result<Self, RegisterError> {
         let common = common_landmarks(template, subject)?;
-        let weights = weights(&common.iter().map(|common| common.name).collect::<Vec<_>>());
+        let names: Vec<&str> = common.iter().map(|common| common.name).collect();
+        let weights = weights.on(&subject.name, &names);
         let own: Vec<DVec3> =
             common.iter().map(|common| template.point(&template.positions, common.at)).collect();
         let theirs: Vec<DVec3> = common.iter().map(|common| common.target).collect();
@@ -139,7 +176,7 @@ impl<'a> Laid<'a> {
             ..LandmarkPull::new(common.at, target.as_vec3a())
         };
         let pulls = common.iter().zip(&targets).zip(&weights).map(pull).collect();
-        Ok(Self { name: &subject.name, scan, pulls, start })
+        Ok(Self { name: subject.name.clone(), scan, pulls, start })
     }
 }
 

@@ -1,12 +1,12 @@
 //! Whether a result can be used as it is. Every limit is in [`CRITERIA`]; `docs/report.md` tells them to people.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::report::ScanReport;
 use crate::preflight::{Code, Finding, Severity};
 
 /// What to do with a result.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
     /// Use it.

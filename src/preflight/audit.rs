@@ -4,15 +4,14 @@ use std::collections::BTreeMap;
 
 use glam::DVec3;
 use rayon::prelude::*;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::alignment::{Aligned, Points, align_either, median, shared_shape};
 use super::canonical::Canonical;
 use super::face_model::FaceModel;
 use super::finding::{Code, Finding, some_of};
-use super::off_surface::distances_from_surface;
 use super::suspicion::Suspicion;
-use crate::mesh::{LandmarkSet, TriangleMesh};
+use crate::mesh::LandmarkSet;
 
 /// Landmarks that are held against each other at most: the first that enough scans have.
 const MOST_LANDMARKS: usize = 400;
@@ -41,12 +40,12 @@ pub struct AuditCase<'a> {
     pub name: &'a str,
     /// Its landmarks.
     pub landmarks: &'a LandmarkSet,
-    /// Its surface, in the same space, if it is to be asked whether the landmarks lie on it.
-    pub mesh: Option<&'a TriangleMesh>,
+    /// How far each is from its surface, see [`landmark_distances`](super::landmark_distances), if that is to be asked.
+    pub distances: Option<&'a BTreeMap<String, f64>>,
 }
 
 /// What a collection's landmarks look like beside each other.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct LandmarkAudit {
     /// For each landmark that was audited, the median over scans of its distance from the shared shape after a robust
     /// alignment, in units of the face's root mean square radius.
@@ -56,7 +55,7 @@ pub struct LandmarkAudit {
 }
 
 /// What one scan's landmarks look like.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ScanAudit {
     /// The scan.
     pub name: String,
@@ -72,7 +71,7 @@ pub struct ScanAudit {
 ///
 /// Every landmark is held against where it should be from the scan's other landmarks, as the other scans teach: a scan
 /// is never judged by itself. Fewer than eight scans are judged by sculpted heads if they state a scheme that the program
-/// knows, and not at all otherwise. With a mesh, landmarks are also held against the surface. Landmarks that less than
+/// knows, and not at all otherwise. With their distances, landmarks are also held against the surface. Landmarks that less than
 /// half of the scans have are passed over, and all beyond the first 400.
 pub fn audit(cases: &[AuditCase]) -> LandmarkAudit {
     let names = names(cases);
@@ -83,8 +82,9 @@ pub fn audit(cases: &[AuditCase]) -> LandmarkAudit {
             names.iter().map(|name| points.get(name.as_str()).copied()).collect()
         })
         .collect();
-    let distances: Vec<Option<Vec<f64>>> =
-        cases.iter().zip(&faces).map(|(case, face)| Some(distances_from_surface(case.mesh?, face))).collect();
+    let distance = |own: &BTreeMap<String, f64>, name| own.get(name).copied().unwrap_or(f64::NAN);
+    let in_order = |own: &BTreeMap<String, f64>| names.iter().map(|name| distance(own, name)).collect();
+    let distances: Vec<Option<Vec<f64>>> = cases.iter().map(|case| case.distances.map(in_order)).collect();
     let whole = |face: &&Points| face.iter().flatten().count() >= LEAST_LANDMARKS;
     let usable: Vec<Points> = faces.iter().filter(whole).cloned().collect();
     let canonical =

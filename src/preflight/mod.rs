@@ -20,4 +20,5 @@ pub use connectivity::{BoundaryLoop, Component};
 pub use finding::{Code, Finding, Severity};
 pub use frame::{Axes, Basis, Unit, UnitGuess};
 pub use inspection::Inspection;
+pub use off_surface::landmark_distances;
 pub use scan_landmarks::LandmarkFigures;

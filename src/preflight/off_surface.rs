@@ -1,11 +1,20 @@
+use std::collections::BTreeMap;
+
 use glam::{DVec3, Vec3A};
 use rayon::prelude::*;
 
-use crate::mesh::TriangleMesh;
+use crate::mesh::{LandmarkSet, TriangleMesh};
 use crate::spatial::{SurfaceIndex, closest_on_triangle};
 
 /// For more points than this it pays to sort the triangles first.
 const FEW: usize = 100;
+
+/// How far each landmark that is there is from its scan's surface, in the scan's units.
+pub fn landmark_distances(mesh: &TriangleMesh, landmarks: &LandmarkSet) -> BTreeMap<String, f64> {
+    let distances = distances_from_surface(mesh, &landmarks.points);
+    let there = landmarks.names.iter().zip(distances).filter(|(_, distance)| !distance.is_nan());
+    there.map(|(name, distance)| (name.clone(), distance)).collect()
+}
 
 /// How far each point is from a surface, in the surface's units; NaN for one that is missing.
 pub(super) fn distances_from_surface(mesh: &TriangleMesh, points: &[Option<DVec3>]) -> Vec<f64> {

@@ -25,10 +25,12 @@ fn inspected(mesh: &TriangleMesh, landmarks: &LandmarkSet) -> Vec<Code> {
 }
 
 fn audited(heads: &[SculptedHead], surfaces: bool) -> LandmarkAudit {
-    let cases = heads.iter().map(|head| AuditCase {
+    let distances: Vec<_> =
+        heads.iter().map(|head| landmark_distances(&head.mesh, &head.landmarks)).collect();
+    let cases = heads.iter().zip(&distances).map(|(head, distances)| AuditCase {
         name: &head.name,
         landmarks: &head.landmarks,
-        mesh: surfaces.then_some(&head.mesh),
+        distances: surfaces.then_some(distances),
     });
     audit(&cases.collect::<Vec<_>>())
 }
@@ -121,7 +123,7 @@ fn a_collection_of_sculpted_heads_raises_hardly_an_alarm() {
     }
     for (count, most) in [(1, 0), (3, 0), (5, 0), (12, 0), (100, 2)] {
         let faces = faces(count);
-        let cases = faces.iter().map(|landmarks| AuditCase { name: "scan", landmarks, mesh: None });
+        let cases = faces.iter().map(|landmarks| AuditCase { name: "scan", landmarks, distances: None });
         let audit = audit(&cases.collect::<Vec<_>>());
         let alarms: Vec<&Finding> = audit.scans.iter().flat_map(|scan| &scan.findings).collect();
         assert!(alarms.len() <= most, "{count} scans: {alarms:?}");
@@ -191,7 +193,7 @@ fn an_exchange_is_called_an_exchange() {
 fn strange_sets_do_not_panic() {
     let empty = LandmarkSet::default();
     assert_eq!(audit(&[]).scans, []);
-    let case = |landmarks| AuditCase { name: "scan", landmarks, mesh: None };
+    let case = |landmarks| AuditCase { name: "scan", landmarks, distances: None };
     assert_eq!(audit(&[case(&empty)]).scans[0].findings, []);
     let at_one_place = LandmarkSet {
         scheme: Some("multipie68".into()),

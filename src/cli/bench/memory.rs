@@ -8,8 +8,17 @@ pub fn forget_peak() {
 
 /// The largest amount of memory that was held, in MiB; `None` where the system does not say.
 pub fn peak() -> Option<f64> {
+    mebibytes("VmHWM:")
+}
+
+/// The memory that is held now, in MiB; `None` where the system does not say.
+pub fn resident() -> Option<f64> {
+    mebibytes("VmRSS:")
+}
+
+fn mebibytes(field: &str) -> Option<f64> {
     let status = fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
+    let line = status.lines().find_map(|line| line.strip_prefix(field))?;
     let kibibytes: f64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
     Some(kibibytes / 1024.0)
 }

@@ -4,6 +4,7 @@ mod clock;
 mod kernels;
 mod memory;
 mod readers;
+mod service;
 mod stages;
 
 use std::path::PathBuf;
@@ -30,6 +31,9 @@ pub struct Bench {
     /// Fewer repetitions, no template of 40962 vertices, no scan of a million triangles, a smaller sculpted collection
     #[arg(long)]
     quick: bool,
+    /// Nothing but so many small registrations through the service's jobs, and the memory in between
+    #[arg(long, value_name = "N")]
+    soak: Option<usize>,
     /// Leaves a part out; may be repeated
     #[arg(long, value_enum, value_name = "PART")]
     skip: Vec<Part>,
@@ -47,6 +51,8 @@ enum Part {
     Paper,
     /// A whole collection, from reading to written results
     Collection,
+    /// The sculpted collection through the service's jobs, from upload to results
+    Service,
 }
 
 impl Bench {
@@ -57,12 +63,18 @@ impl Bench {
         let sculpted = self.inputs.is_empty();
         let clock = Clock::new(if self.quick { 1 } else { 5 });
         clock.head();
+        if let Some(registrations) = self.soak {
+            return service::soak(registrations);
+        }
         // First, while nothing else has taken memory.
         if self.does(Part::Collection) {
             collections.iter().try_for_each(|path| stages::collection(path))?;
             if sculpted {
                 stages::sculpted_collection(if self.quick { 3 } else { HEADS }, TRIANGLES)?;
             }
+        }
+        if self.does(Part::Service) && sculpted {
+            service::collection(if self.quick { 3 } else { HEADS }, TRIANGLES)?;
         }
         let finest = if self.quick { 10242 } else { 40962 };
         for Bed { name, scan, landmarks } in beds(&scans, sculpted)? {

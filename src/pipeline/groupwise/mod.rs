@@ -20,9 +20,9 @@ mod unfold;
 pub use closure::close_smoothly;
 pub use mean::mean_shape;
 pub use member::{Member, register_member};
-pub use redistribution::redistribute;
+pub use redistribution::{need, redistribute};
 pub use rest_shape::RestShape;
-pub use shared_mesh::SharedMesh;
+pub use shared_mesh::{SharedMesh, carried};
 
 use glam::Vec3A;
 

@@ -14,19 +14,13 @@ const STRIDE: f32 = 0.2;
 
 /// Density adaptation of the shared template: vertices flow over the sphere to where the members need them.
 ///
-/// Every sample of a scan asks for kappa^p at the point of its member that lies nearest in position and normal, kappa
-/// the scan's own curvature there, so that what a member has yet to enter counts as well; a vertex's need n_i is the
-/// most that any member asks of it. The flow moves vertices along the gradient of psi, with
+/// A vertex's need n_i is the most that any member asks of it, by its [`need`] `[N]`. The flow moves vertices along the gradient of psi, with
 /// L psi = log(A_i n_i) - mean, until their areas A on the sphere are inverse to the need. On the sphere nothing is in
 /// the way, so no triangle folds.
 ///
 /// Returns the point of the old sphere that each vertex `[N]` moves to.
-pub fn redistribute(
-    sphere: &Sphere,
-    members: &[(&ScanSurface, &[Vec3A])],
-    settings: &GroupwiseSettings,
-) -> Vec<Hit> {
-    let need = need(sphere, members, settings);
+pub fn redistribute(sphere: &Sphere, needs: &[impl AsRef<[f32]>], settings: &GroupwiseSettings) -> Vec<Hit> {
+    let need = most_needed(sphere, needs, settings);
     let topology = &sphere.connectivity.topology;
     let index = SurfaceIndex::new(&sphere.rest, &topology.triangles);
     let solver = sphere.connectivity.diffusion(FLOW_LAMBDA);
@@ -78,33 +72,37 @@ fn flow(topology: &Topology, x: &[Vec3A], psi: &[f32]) -> Vec<Vec3A> {
     x.iter().zip(steps).map(|(x, (step, _))| (*x + step * share).normalize()).collect()
 }
 
-/// n_i per vertex `[N]`, on the old sphere, smoothed: what the scans' samples ask for where they lie nearest.
-fn need(sphere: &Sphere, members: &[(&ScanSurface, &[Vec3A])], settings: &GroupwiseSettings) -> Vec<f32> {
-    let smoother = sphere.connectivity.diffusion(settings.need_smoothing);
-    let own = |&(scan, shape): &(&ScanSurface, &[Vec3A])| {
-        let index = SurfaceIndex::new(shape, &sphere.connectivity.topology.triangles);
-        let mut own = vec![0f32; shape.len()];
-        for k in 0..settings.samples {
-            let sample = scan.sample(k);
-            let search = settings.normal_search[1] * settings.normal_search[1];
-            let Some(hit) =
-                index.closest_oriented(sample.point, sample.normal, search, -1.0, f32::INFINITY, None)
-            else {
-                continue;
-            };
-            let asked = sample.curvature.clamp(1.0, 60.0).powf(settings.curvature_power);
-            let corners = sphere.connectivity.topology.triangles[hit.triangle as usize];
-            for (&i, w) in corners.iter().zip(hit.weights) {
-                own[i as usize] += w * asked * sample.weight;
-            }
+/// What one member needs around each vertex `[N]`, on the sphere, smoothed.
+///
+/// Every sample of its scan asks for kappa^p at the point of the member that lies nearest in position and normal, kappa
+/// the scan's own curvature there, so that what the member has yet to enter counts as well.
+pub fn need(sphere: &Sphere, scan: &ScanSurface, shape: &[Vec3A], settings: &GroupwiseSettings) -> Vec<f32> {
+    let index = SurfaceIndex::new(shape, &sphere.connectivity.topology.triangles);
+    let search = settings.normal_search[1] * settings.normal_search[1];
+    let mut need = vec![0f32; shape.len()];
+    for k in 0..settings.samples {
+        let sample = scan.sample(k);
+        let Some(hit) =
+            index.closest_oriented(sample.point, sample.normal, search, -1.0, f32::INFINITY, None)
+        else {
+            continue;
+        };
+        let asked = sample.curvature.clamp(1.0, 60.0).powf(settings.curvature_power);
+        let corners = sphere.connectivity.topology.triangles[hit.triangle as usize];
+        for (&i, w) in corners.iter().zip(hit.weights) {
+            need[i as usize] += w * asked * sample.weight;
         }
-        smoother.solve_scalar(&mut own, &mut SolveBuffer::default());
-        own
-    };
-    let all: Vec<Vec<f32>> = members.par_iter().map(own).collect();
+    }
+    let smoother = sphere.connectivity.diffusion(settings.need_smoothing);
+    smoother.solve_scalar(&mut need, &mut SolveBuffer::default());
+    need
+}
+
+/// n_i per vertex `[N]`: the most that any member needs, within limits.
+fn most_needed(sphere: &Sphere, needs: &[impl AsRef<[f32]>], settings: &GroupwiseSettings) -> Vec<f32> {
     let mut need = vec![0f32; sphere.rest.len()];
-    for own in all {
-        need.iter_mut().zip(own).for_each(|(need, own)| *need = need.max(own));
+    for own in needs {
+        need.iter_mut().zip(own.as_ref()).for_each(|(need, own)| *need = need.max(*own));
     }
     let mut sorted = need.clone();
     sorted.sort_by(f32::total_cmp);
@@ -134,7 +132,7 @@ mod tests {
         let mesh = TriangleMesh::new(positions, Icosphere::new(4).triangles).unwrap();
         let scan = ScanSurface::new(&mesh, 20_000);
         let member: Vec<Vec3A> = member.iter().map(|p| scan.to_unit(p.as_dvec3())).collect();
-        let hits = redistribute(&sphere, &[(&scan, &member)], &settings);
+        let hits = redistribute(&sphere, &[need(&sphere, &scan, &member, &settings)], &settings);
         let moved: Vec<Vec3A> = hits.iter().map(|h| h.point).collect();
         let inside = |p: &[Vec3A]| p.iter().filter(|p| p.z > 0.9).count();
         assert!(inside(&moved) > 2 * inside(&sphere.rest), "{} {}", inside(&moved), inside(&sphere.rest));

@@ -1,0 +1,11 @@
+/// Prints the OpenAPI document of the service.
+#[derive(Debug, clap::Args)]
+pub struct Openapi {}
+
+impl Openapi {
+    /// Does it.
+    pub fn run(self) -> anyhow::Result<()> {
+        print!("{}", onemesh::http::openapi_json());
+        Ok(())
+    }
+}

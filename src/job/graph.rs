@@ -1,0 +1,387 @@
+//! The graph of steps in the database: which step is next, and what follows when one ends. Every change is one
+//! transaction, so that what is done and what follows from it are never apart.
+
+use std::time::Duration;
+
+use sqlx::sqlite::SqliteConnection;
+use sqlx::{FromRow, Row};
+
+use super::clock::now;
+use super::event::{Event, EventKind};
+use super::record::{ALL, add_event, broken, from_json, json};
+use super::registration::{Problem, ResultFile, Status};
+use super::scan::ScanId;
+use super::stage::JobStage;
+use super::store_error::StoreError;
+use super::work::Decided;
+use crate::formats::Sha256;
+use crate::pipeline::Verdict;
+
+/// Seconds that a step is taken to need until it is known.
+const ASSUMED: f64 = 1.0;
+
+/// A step that ended the program so often runs alone, so that it harms no other and no other is taken for it.
+const SUSPECT: i64 = 2;
+
+/// A step that somebody has taken on.
+#[derive(Debug, Clone)]
+pub(super) struct Claim {
+    pub step: i64,
+    /// Counts its runs: a run that was taken from it cannot end it.
+    pub run: i64,
+    pub registration: i64,
+    /// Its number among the stages.
+    pub number: i64,
+    pub place: i64,
+    pub stages: Vec<JobStage>,
+    /// It must run alone.
+    pub alone: bool,
+}
+
+impl Claim {
+    pub fn stage(&self) -> JobStage {
+        self.stages[self.number as usize]
+    }
+}
+
+/// What a step left, in the store.
+pub(super) struct Done {
+    pub output: Option<Sha256>,
+    pub files: Vec<(ResultFile, Sha256, u64)>,
+    pub decided: Decided,
+    pub seconds: f64,
+}
+
+/// What a change did, for those who watch.
+#[derive(Default)]
+pub(super) struct Changed {
+    /// New events, each with its registration.
+    pub events: Vec<(i64, Event)>,
+    /// Steps that became ready.
+    pub ready: usize,
+    /// Blobs that are no longer needed here.
+    pub dropped: Vec<Sha256>,
+    /// Registrations that came to an end.
+    pub ended: Vec<i64>,
+}
+
+#[derive(FromRow)]
+struct Candidate {
+    id: i64,
+    stage: i64,
+    place: i64,
+    crashes: i64,
+}
+
+/// Takes on the next step: that of the registration which has had the least work of its priority, late stages first.
+pub(super) async fn claim(
+    tx: &mut SqliteConnection,
+    changed: &mut Changed,
+    others_run: bool,
+) -> Result<Option<Claim>, StoreError> {
+    let whose = "SELECT r.sequence, r.status, r.stage, r.stages FROM registration r
+        WHERE r.status IN ('queued', 'running')
+            AND EXISTS (SELECT 1 FROM step s WHERE s.registration = r.sequence AND s.state = 'ready' AND s.crashes < ?)
+        ORDER BY r.priority DESC, r.turn, r.sequence LIMIT 1";
+    // Suspects have their turn when nothing else runs.
+    let below = if others_run { SUSPECT } else { i64::MAX };
+    let Some(row) = sqlx::query(whose).bind(below).fetch_optional(&mut *tx).await? else { return Ok(None) };
+    let registration: i64 = row.try_get("sequence")?;
+    let next = "SELECT id, stage, place, crashes FROM step
+        WHERE registration = ? AND state = 'ready' AND crashes < ? ORDER BY crashes, stage DESC, place LIMIT 1";
+    let next = sqlx::query_as::<_, Candidate>(next).bind(registration).bind(below);
+    let Candidate { id, stage, place, crashes } = next.fetch_one(&mut *tx).await?;
+    let run = "UPDATE step SET state = 'running', runs = runs + 1 WHERE id = ? RETURNING runs";
+    let run: i64 = sqlx::query_scalar(run).bind(id).fetch_one(&mut *tx).await?;
+    let stages: Vec<JobStage> = from_json(row.try_get("stages")?)?;
+    let name =
+        stages.get(usize::try_from(stage).map_err(broken)?).ok_or_else(|| broken("a step has no stage"))?;
+    if row.try_get::<&str, _>("status")? == "queued" {
+        let event = EventKind::Status { status: Status::Running };
+        changed.events.push(add_event(tx, registration, event).await?);
+    }
+    if row.try_get::<Option<i64>, _>("stage")?.is_none_or(|last| last < stage) {
+        let event = EventKind::Stage { stage: name.name().to_owned() };
+        changed.events.push(add_event(tx, registration, event).await?);
+    }
+    let begin =
+        "UPDATE registration SET status = 'running', started_at = coalesce(started_at, ?1), turn = turn + ?2,
+        stage = max(coalesce(stage, 0), ?3) WHERE sequence = ?4";
+    sqlx::query(begin).bind(now()).bind(ASSUMED).bind(stage).bind(registration).execute(&mut *tx).await?;
+    let child = "UPDATE child SET status = 'running', started_at = coalesce(started_at, ?1), stage = ?2
+        WHERE registration = ?3 AND place = ?4";
+    sqlx::query(child).bind(now()).bind(stage).bind(registration).bind(place).execute(&mut *tx).await?;
+    let alone = crashes >= SUSPECT;
+    Ok(Some(Claim { step: id, run, registration, number: stage, place, stages, alone }))
+}
+
+/// Ends a step that did its work, and begins what follows. Says whether it was still its own.
+pub(super) async fn finish(
+    tx: &mut SqliteConnection,
+    claim: &Claim,
+    done: Done,
+    changed: &mut Changed,
+) -> Result<bool, StoreError> {
+    let Done { output, files, decided, seconds } = done;
+    if !end_step(tx, claim, "done", output, seconds).await? {
+        return Ok(false);
+    }
+    for (file, digest, size) in files {
+        let insert = "INSERT INTO result (registration, file, digest, size) VALUES (?, ?, ?, ?)
+            ON CONFLICT DO UPDATE SET digest = excluded.digest, size = excluded.size";
+        let insert = sqlx::query(insert).bind(claim.registration).bind(file.path());
+        insert.bind(digest.to_string()).bind(size.cast_signed()).execute(&mut *tx).await?;
+    }
+    let mut stages = claim.stages.clone();
+    match decided {
+        Decided::Nothing => {}
+        Decided::Course(course, left_out) => {
+            let set = sqlx::query("UPDATE registration SET stages = ? WHERE sequence = ?");
+            set.bind(json(&course)).bind(claim.registration).execute(&mut *tx).await?;
+            stages = course;
+            for (place, detail) in left_out {
+                let problem = Problem { code: "too_few_landmarks".to_owned(), detail };
+                fail_child(tx, claim.registration, place, &problem, changed).await?;
+            }
+        }
+        Decided::Verdict(verdict) => end_child(tx, claim, verdict, changed).await?,
+    }
+    follow(tx, claim, &stages, changed).await?;
+    Ok(true)
+}
+
+/// Ends a step that cannot do its work: its scan fails, or all do.
+pub(super) async fn fail(
+    tx: &mut SqliteConnection,
+    claim: &Claim,
+    problem: &Problem,
+    seconds: f64,
+    changed: &mut Changed,
+) -> Result<bool, StoreError> {
+    if !end_step(tx, claim, "failed", None, seconds).await? {
+        return Ok(false);
+    }
+    if claim.place == ALL {
+        end(tx, claim.registration, Status::Failed, Some(problem), changed).await?;
+    } else {
+        fail_child(tx, claim.registration, claim.place, problem, changed).await?;
+        follow(tx, claim, &claim.stages, changed).await?;
+    }
+    Ok(true)
+}
+
+/// Gives a step back, to be run again.
+pub(super) async fn give_back(tx: &mut SqliteConnection, claim: &Claim) -> Result<(), StoreError> {
+    let query = "UPDATE step SET state = 'ready' WHERE id = ? AND runs = ? AND state = 'running'";
+    sqlx::query(query).bind(claim.step).bind(claim.run).execute(tx).await?;
+    Ok(())
+}
+
+/// Has the step run again whose output this is, and the claimed one after it; says whether there is one.
+pub(super) async fn redo(
+    tx: &mut SqliteConnection,
+    claim: &Claim,
+    output: Sha256,
+    changed: &mut Changed,
+) -> Result<bool, StoreError> {
+    let output = output.to_string();
+    // It keeps its output, so that others who find that damaged wait for it too.
+    let again = "UPDATE step SET state = 'ready' WHERE registration = ? AND output = ? AND state = 'done'";
+    let again = sqlx::query(again).bind(claim.registration).bind(&output).execute(&mut *tx).await?;
+    changed.ready += again.rows_affected() as usize;
+    let open = "SELECT count(*) FROM step WHERE registration = ? AND output = ? AND state IN ('waiting', 'ready', 'running')";
+    let open = sqlx::query_scalar::<_, i64>(open).bind(claim.registration).bind(&output);
+    if open.fetch_one(&mut *tx).await? == 0 {
+        return Ok(false);
+    }
+    let wait = "UPDATE step SET state = 'waiting' WHERE id = ? AND runs = ? AND state = 'running'";
+    sqlx::query(wait).bind(claim.step).bind(claim.run).execute(tx).await?;
+    Ok(true)
+}
+
+/// Ends a registration, whatever of it is open.
+pub(super) async fn end(
+    tx: &mut SqliteConnection,
+    registration: i64,
+    status: Status,
+    problem: Option<&Problem>,
+    changed: &mut Changed,
+) -> Result<(), StoreError> {
+    let open = "UPDATE child SET status = ?, problem = coalesce(problem, ?), finished_at = ?
+        WHERE registration = ? AND status IN ('queued', 'running') RETURNING scan";
+    let of_child = if status == Status::Canceled { Status::Canceled } else { Status::Failed };
+    let problem = problem.map(json);
+    let open = sqlx::query_scalar::<_, String>(open).bind(of_child.name()).bind(&problem);
+    for scan in open.bind(now()).bind(registration).fetch_all(&mut *tx).await? {
+        let scan: ScanId = scan.parse().map_err(broken)?;
+        let event = EventKind::Child { scan, status: of_child, verdict: None, problem: None };
+        changed.events.push(add_event(tx, registration, event).await?);
+    }
+    let outputs = sqlx::query_scalar::<_, String>(
+        "SELECT output FROM step WHERE registration = ? AND output IS NOT NULL",
+    );
+    let outputs = outputs.bind(registration).fetch_all(&mut *tx).await?;
+    changed.dropped.extend(outputs.iter().filter_map(|digest| digest.parse::<Sha256>().ok()));
+    changed.ended.push(registration);
+    let drop = "UPDATE step SET state = CASE state WHEN 'done' THEN 'done' WHEN 'failed' THEN 'failed' ELSE 'dropped' END,
+        output = NULL WHERE registration = ?";
+    sqlx::query(drop).bind(registration).execute(&mut *tx).await?;
+    let query = "UPDATE registration SET status = ?1, problem = ?2, finished_at = ?3, expires_at = ?3 + keep WHERE sequence = ?4";
+    let query = sqlx::query(query).bind(status.name()).bind(problem).bind(now());
+    query.bind(registration).execute(&mut *tx).await?;
+    changed.events.push(add_event(tx, registration, EventKind::Status { status }).await?);
+    Ok(())
+}
+
+async fn end_step(
+    tx: &mut SqliteConnection,
+    claim: &Claim,
+    state: &str,
+    output: Option<Sha256>,
+    seconds: f64,
+) -> Result<bool, StoreError> {
+    let query = "UPDATE step SET state = ?, output = ?, seconds = coalesce(seconds, 0) + ?
+        WHERE id = ? AND runs = ? AND state = 'running'";
+    let query = sqlx::query(query).bind(state).bind(output.map(|digest| digest.to_string())).bind(seconds);
+    let ended = query.bind(claim.step).bind(claim.run).execute(&mut *tx).await?.rows_affected() == 1;
+    let charge = "UPDATE registration SET seconds = seconds + ?1, turn = turn + ?1 - ?2 WHERE sequence = ?3";
+    sqlx::query(charge).bind(seconds).bind(ASSUMED).bind(claim.registration).execute(tx).await?;
+    Ok(ended)
+}
+
+async fn end_child(
+    tx: &mut SqliteConnection,
+    claim: &Claim,
+    verdict: Verdict,
+    changed: &mut Changed,
+) -> Result<(), StoreError> {
+    let query = "UPDATE child SET status = 'succeeded', verdict = ?, finished_at = ?
+        WHERE registration = ? AND place = ? RETURNING scan";
+    let query = sqlx::query_scalar::<_, String>(query).bind(json(&verdict)).bind(now());
+    let scan = query.bind(claim.registration).bind(claim.place).fetch_one(&mut *tx).await?;
+    let scan = scan.parse().map_err(broken)?;
+    let event = EventKind::Child { scan, status: Status::Succeeded, verdict: Some(verdict), problem: None };
+    changed.events.push(add_event(tx, claim.registration, event).await?);
+    Ok(())
+}
+
+/// Fails one scan; the others go on without it.
+pub(super) async fn fail_child(
+    tx: &mut SqliteConnection,
+    registration: i64,
+    place: i64,
+    problem: &Problem,
+    changed: &mut Changed,
+) -> Result<(), StoreError> {
+    let query = "UPDATE child SET status = 'failed', problem = ?, finished_at = ?
+        WHERE registration = ? AND place = ? AND status IN ('queued', 'running') RETURNING scan";
+    let query = sqlx::query_scalar::<_, String>(query).bind(json(problem)).bind(now());
+    if let Some(scan) = query.bind(registration).bind(place).fetch_optional(&mut *tx).await? {
+        let (scan, problem) = (scan.parse().map_err(broken)?, Some(problem.clone()));
+        let event = EventKind::Child { scan, status: Status::Failed, verdict: None, problem };
+        changed.events.push(add_event(tx, registration, event).await?);
+    }
+    Ok(())
+}
+
+/// Begins what follows a step that ended, done or failed.
+pub(super) async fn follow(
+    tx: &mut SqliteConnection,
+    claim: &Claim,
+    stages: &[JobStage],
+    changed: &mut Changed,
+) -> Result<(), StoreError> {
+    let registration = claim.registration;
+    let next = claim.number + 1;
+    let is_shared = |number: i64| stages.get(number as usize).is_none_or(|stage| stage.is_shared());
+    if claim.place == ALL && next as usize == stages.len() {
+        return complete(tx, registration, changed).await;
+    }
+    if !is_shared(next) {
+        // The scan's own next stage waits for no other scan.
+        let begin = "INSERT INTO step (registration, stage, place, state)
+            SELECT registration, ?1, place, 'ready' FROM child
+            WHERE registration = ?2 AND status IN ('queued', 'running') AND (place = ?3 OR ?3 = -1)
+            ON CONFLICT DO NOTHING";
+        let begin = sqlx::query(begin).bind(next).bind(registration).bind(claim.place);
+        changed.ready += begin.execute(&mut *tx).await?.rows_affected() as usize;
+    }
+    let waiting = "UPDATE step SET state = 'ready' WHERE registration = ?1 AND state = 'waiting' AND NOT EXISTS
+        (SELECT 1 FROM step o WHERE o.registration = ?1 AND o.state IN ('waiting', 'ready', 'running') AND o.stage < step.stage)";
+    changed.ready +=
+        sqlx::query(waiting).bind(registration).execute(&mut *tx).await?.rows_affected() as usize;
+    let open =
+        "SELECT count(*) FROM step WHERE registration = ? AND state IN ('waiting', 'ready', 'running')";
+    if sqlx::query_scalar::<_, i64>(open).bind(registration).fetch_one(&mut *tx).await? > 0 {
+        return Ok(());
+    }
+    let alive = "SELECT count(*) FROM child WHERE registration = ? AND status != 'failed'";
+    if sqlx::query_scalar::<_, i64>(alive).bind(registration).fetch_one(&mut *tx).await? == 0 {
+        let detail = "no scan is left to register: see what each of them failed by".to_owned();
+        let problem = Problem { code: "no_scan_left".to_owned(), detail };
+        return end(tx, registration, Status::Failed, Some(&problem), changed).await;
+    }
+    let barrier = (next..).find(|&number| is_shared(number)).unwrap_or(next);
+    let begin = "INSERT INTO step (registration, stage, place, state) VALUES (?, ?, -1, 'ready') ON CONFLICT DO NOTHING";
+    let begin = sqlx::query(begin).bind(registration).bind(barrier).execute(&mut *tx).await?;
+    changed.ready += begin.rows_affected() as usize;
+    Ok(())
+}
+
+/// Ends a registration of which everything is done.
+async fn complete(
+    tx: &mut SqliteConnection,
+    registration: i64,
+    changed: &mut Changed,
+) -> Result<(), StoreError> {
+    let failed = "SELECT count(*) FROM child WHERE registration = ? AND status = 'failed'";
+    let failed: i64 = sqlx::query_scalar(failed).bind(registration).fetch_one(&mut *tx).await?;
+    let status = if failed > 0 { Status::PartiallySucceeded } else { Status::Succeeded };
+    end(tx, registration, status, None, changed).await
+}
+
+/// Fails a registration that has taken more work than one may.
+pub(super) async fn end_if_too_long(
+    tx: &mut SqliteConnection,
+    registration: i64,
+    most: Duration,
+    changed: &mut Changed,
+) -> Result<(), StoreError> {
+    let query = "SELECT 1 FROM registration WHERE sequence = ? AND status = 'running' AND seconds > ?";
+    let query = sqlx::query_scalar::<_, i64>(query).bind(registration).bind(most.as_secs_f64());
+    if query.fetch_optional(&mut *tx).await?.is_none() {
+        return Ok(());
+    }
+    let detail = format!("it took more than {} s of work: register fewer scans at once", most.as_secs());
+    let problem = Problem { code: "too_slow".to_owned(), detail };
+    end(tx, registration, Status::Failed, Some(&problem), changed).await
+}
+
+/// Fails steps during which the program ended too often, each with its scan.
+pub(super) async fn fail_crashed(
+    tx: &mut SqliteConnection,
+    most: u32,
+    changed: &mut Changed,
+) -> Result<(), StoreError> {
+    let crashed = "SELECT s.id, s.runs, s.registration, s.stage, s.place, r.stages FROM step s
+        JOIN registration r ON r.sequence = s.registration WHERE s.state = 'ready' AND s.crashes >= ?";
+    for row in sqlx::query(crashed).bind(most).fetch_all(&mut *tx).await? {
+        let claim = Claim {
+            step: row.try_get("id")?,
+            run: row.try_get("runs")?,
+            registration: row.try_get("registration")?,
+            number: row.try_get("stage")?,
+            place: row.try_get("place")?,
+            stages: from_json(row.try_get("stages")?)?,
+            alone: true,
+        };
+        let running = sqlx::query("UPDATE step SET state = 'running' WHERE id = ?").bind(claim.step);
+        running.execute(&mut *tx).await?;
+        let detail = format!(
+            "the program ended {most} times while it worked on this, perhaps for want of memory: give a smaller scan"
+        );
+        let problem = Problem { code: "crashed".to_owned(), detail };
+        fail(tx, &claim, &problem, 0.0, changed).await?;
+    }
+    Ok(())
+}
