@@ -12,10 +12,11 @@ use super::scan::ScanId;
 use super::stage::JobStage;
 use crate::formats::Sha256;
 use crate::pipeline::{
-    BadState, ComparisonRow, FailedScan, FrozenCollection, InputEntry, Inspected, LandmarkEntry, LandmarkWeights, MOST_ROWS,
-    Manifest, Observer, OutputEntry, OutputFormat, Placed, Plan, PlanStage, Precheck, Prepared,
-    RegisterError, Report, ScanEntry, ScanResult, ScanState, Settings, SharedState, Subject, Template,
-    Verdict, comparison_row, comparison_sheet, decode, encode, leave_out, precheck_inspected, record_bytes,
+    BadState, ComparisonRow, FailedScan, FrozenCollection, InputEntry, Inspected, LandmarkEntry,
+    LandmarkWeights, MOST_ROWS, Manifest, Observer, OutputEntry, OutputFormat, Placed, Plan, PlanStage,
+    Precheck, Prepared, RegisterError, Report, ScanEntry, ScanResult, ScanState, Settings, SharedState,
+    Subject, Template, Verdict, comparison_row, comparison_sheet, decode, encode, leave_out,
+    precheck_inspected, record_bytes,
 };
 use crate::preflight::LandmarkAudit;
 

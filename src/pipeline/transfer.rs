@@ -156,11 +156,7 @@ impl TemplateCourse {
 
 impl Laid {
     /// Lays the template on a scan by the landmarks that both have, which count as `weights` says of their names.
-    fn of(
-        template: &Template,
-        subject: &Subject,
-        weights: &LandmarkWeights,
-    ) -> Result<Self, RegisterError> {
+    fn of(template: &Template, subject: &Subject, weights: &LandmarkWeights) -> Result<Self, RegisterError> {
         let common = common_landmarks(template, subject)?;
         let names: Vec<&str> = common.iter().map(|common| common.name).collect();
         let weights = weights.on(&subject.name, &names);

@@ -68,7 +68,7 @@ pub fn register_member(
         }
     }
     let mut p = registration.p;
-    unfold(&rest.connectivity, registration.scan, &mut p);
+    unfold(&rest.connectivity, registration.scan, registration.landmarks, &mut p);
     Ok(p)
 }
 

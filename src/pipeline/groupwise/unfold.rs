@@ -1,7 +1,8 @@
 use glam::Vec3A;
 use rayon::prelude::*;
 
-use crate::mesh::{Normals, components};
+use crate::energy::LandmarkPull;
+use crate::mesh::{Normals, components, interpolate};
 use crate::pipeline::{Connectivity, ScanSurface};
 use crate::spatial::SurfaceIndex;
 
@@ -20,16 +21,19 @@ const SAMPLES: usize = 20_000;
 const GROWTH: f32 = 1.2;
 const SLACK: f32 = 2e-7;
 
+/// How far landmarks may drift from their places on the scan: about a millimetre on a head.
+const DRIFT: f32 = 5e-3;
+
 /// Rounds of averaging the normals that tell one sheet of the scan from the one behind it.
 const NORMAL_ROUNDS: usize = 2;
 
 /// Unfolds triangles of a registered shape `[N, 3]` that lie on the scan and face away from it.
 ///
 /// The vertices around each fold slide over the scan to the mean of their neighbours: a flat patch whose vertices all
-/// lie there has no folds (Tutte 1963). A fold keeps its new positions if fewer of its triangles are folded in them
-/// and the scan's samples there are no farther from it than they were; otherwise its old ones.
-pub fn unfold(connectivity: &Connectivity, scan: &ScanSurface, p: &mut [Vec3A]) {
-    let folds = Folds { connectivity, scan };
+/// lie there has no folds (Tutte 1963). A fold keeps its new positions if fewer of its triangles are folded in them,
+/// the scan's samples there are no farther from it than they were, and no landmark drifts; otherwise its old ones.
+pub fn unfold(connectivity: &Connectivity, scan: &ScanSurface, landmarks: &[LandmarkPull], p: &mut [Vec3A]) {
+    let folds = Folds { connectivity, scan, landmarks };
     let mut folded = folds.among(p, 0..connectivity.topology.triangles.len() as u32);
     if folded.is_empty() {
         return;
@@ -49,6 +53,7 @@ pub fn unfold(connectivity: &Connectivity, scan: &ScanSurface, p: &mut [Vec3A]) 
 struct Folds<'a> {
     connectivity: &'a Connectivity,
     scan: &'a ScanSurface,
+    landmarks: &'a [LandmarkPull],
 }
 
 /// What may move around the folds.
@@ -71,18 +76,20 @@ impl Patches {
     }
 }
 
-/// How a patch does: its folded triangles, its samples, and the sum of their squared distances.
+/// How a patch does: its folded triangles, its samples and the sum of their squared distances, and how far the worst of
+/// its landmarks is off.
 #[derive(Debug, Clone, Copy, Default)]
 struct Standing {
     folded: usize,
     samples: usize,
     distance: f32,
+    drift: f32,
 }
 
 impl Standing {
     fn is_better_than(&self, other: &Self) -> bool {
         let allowed = other.distance * GROWTH + SLACK * other.samples as f32;
-        self.folded < other.folded && self.distance <= allowed
+        self.folded < other.folded && self.distance <= allowed && self.drift <= other.drift.max(DRIFT)
     }
 }
 
@@ -209,6 +216,13 @@ impl Folds<'_> {
                 standings[patch].distance += distance;
             }
         }
+        for landmark in self.landmarks {
+            let corners = self.corners(landmark.triangle);
+            if let Some(patch) = patches.of(corners) {
+                let drift = landmark.target.distance(interpolate(p, corners, landmark.weights));
+                standings[patch].drift = standings[patch].drift.max(drift);
+            }
+        }
         standings
     }
 }
@@ -242,10 +256,10 @@ mod tests {
         // Two neighbours that changed places fold the triangles around them.
         let [a, b] = topology.edges[700];
         p.swap(a as usize, b as usize);
-        let folds = Folds { connectivity: &sphere.connectivity, scan: &scan };
+        let folds = Folds { connectivity: &sphere.connectivity, scan: &scan, landmarks: &[] };
         let all = || 0..topology.triangles.len() as u32;
         assert!(folds.among(&p, all()).len() >= 2);
-        unfold(&sphere.connectivity, &scan, &mut p);
+        unfold(&sphere.connectivity, &scan, &[], &mut p);
         assert_eq!(folds.among(&p, all()), [0; 0]);
         let moved = (0..p.len()).filter(|&i| p[i] != flat[i]).count();
         assert!((1..60).contains(&moved), "{moved} moved");
@@ -254,11 +268,27 @@ mod tests {
     }
 
     #[test]
+    fn a_landmark_holds_the_fold_it_lies_in() {
+        let (scan, sphere) = (scan(), Sphere::of_level(4));
+        let topology = &sphere.connectivity.topology;
+        let mut p = on_scan(&scan, &sphere);
+        let [a, b] = topology.edges[700];
+        p.swap(a as usize, b as usize);
+        let before = p.clone();
+        // Where vertex a is now, away from where smoothing takes it.
+        let triangle = topology.fans.row(a as usize)[0][0];
+        let weights = topology.triangles[triangle as usize].map(|i| if i == a { 1.0 } else { 0.0 });
+        let landmark = LandmarkPull { triangle, weights, target: p[a as usize], weight: 1.0 };
+        unfold(&sphere.connectivity, &scan, &[landmark], &mut p);
+        assert_eq!(p, before);
+    }
+
+    #[test]
     fn what_has_no_fold_stays_to_the_bit() {
         let (scan, sphere) = (scan(), Sphere::of_level(4));
         let before = on_scan(&scan, &sphere);
         let mut p = before.clone();
-        unfold(&sphere.connectivity, &scan, &mut p);
+        unfold(&sphere.connectivity, &scan, &[], &mut p);
         assert_eq!(p, before);
     }
 
@@ -269,7 +299,7 @@ mod tests {
         let mirrored = |p: &Vec3A| scan.to_unit(bumpy(Vec3A::new(-p.x, p.y, p.z)).as_dvec3());
         let before: Vec<Vec3A> = sphere.rest.iter().map(mirrored).collect();
         let mut p = before.clone();
-        unfold(&sphere.connectivity, &scan, &mut p);
+        unfold(&sphere.connectivity, &scan, &[], &mut p);
         assert_eq!(p, before);
     }
 }
