@@ -43,7 +43,7 @@ async fn a_registration_is_stopped() {
     let server = Server::start().await;
     let scans = upload(&server, 2).await;
     let mut slow = quick(&scans);
-    slow["parameters"] = json!({ "groupwise.iterations": 100000 });
+    (slow["parameters"], slow["vertices"]) = (json!({}), 40962.into());
     let path = ask(&server, &slow).await.headers["location"].clone();
     let refused = server.get(&format!("{path}/manifest.json")).await;
     assert_eq!(refused.problem(), (409, "conflict".into()));
@@ -86,7 +86,7 @@ async fn requests_that_are_wrong_name_the_field() {
     };
     assert_eq!(field(json!({ "scans": [] })).await, (422, "scans".into()));
     assert_eq!(field(json!({ "scans": [{ "id": "x" }] })).await, (422, "scans[0].id".into()));
-    assert_eq!(field(json!({ "scans": [{ "id": "0".repeat(32) }] })).await, (422, "scans[0].id".into()));
+    assert_eq!(field(json!({ "scans": [{ "id": "0".repeat(32) }] })).await, (422, "scans[0]".into()));
     assert_eq!(field(json!({ "scans": [{ "name": "x" }] })).await, (422, "scans[0]".into()));
     assert_eq!(field(json!({ "template": "x" })).await, (422, "template".into()));
     assert_eq!(field(json!({ "template": "0".repeat(32) })).await, (422, "template".into()));
