@@ -23,7 +23,14 @@ async fn scans_are_registered() {
     let listed = server.get("/v1/registrations?status=succeeded").await.json();
     assert_eq!(listed["items"][0]["id"], done["id"]);
     assert_eq!(server.get("/v1/registrations?status=failed").await.json()["items"], json!([]));
-    let path = format!("/v1/registrations/{}", done["id"].as_str().unwrap());
+    let id = done["id"].as_str().unwrap();
+    let path = format!("/v1/registrations/{id}");
+    for after in [id, "00000000000000000000000000000000"] {
+        let rest = server.get(&format!("/v1/registrations?after={after}")).await.json();
+        assert_eq!(rest["items"], json!([]), "{after}");
+    }
+    let later = server.get("/v1/registrations?after=ffffffffffffffffffffffffffffffff").await.json();
+    assert_eq!(later["items"][0]["id"], id, "the next page stands, whatever was deleted");
     assert_eq!(server.delete(&path).await.status, 204);
     assert_eq!(server.get(&path).await.problem(), (404, "not-found".into()));
 }
