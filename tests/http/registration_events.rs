@@ -45,7 +45,7 @@ async fn streams_end_with_the_server() {
     let server = Server::start().await;
     let scans = upload(&server, 1).await;
     let mut slow = quick(&scans);
-    slow["parameters"] = serde_json::json!({ "transfer.iterations": 100000, "groupwise.iterations": 100000 });
+    (slow["parameters"], slow["vertices"]) = (serde_json::json!({}), 40962.into());
     let path = crate::study::ask(&server, &slow).await.headers["location"].clone();
     let path = format!("{path}/events");
     let address = server.address;
