@@ -10,7 +10,7 @@ pub struct Server {
     /// `http://HOST:PORT`.
     pub url: String,
     child: Child,
-    _folder: TempDir,
+    folder: TempDir,
 }
 
 impl Server {
@@ -20,9 +20,19 @@ impl Server {
 
     /// One with further arguments.
     pub fn with(arguments: &[&str]) -> Self {
-        let folder = tempfile::tempdir().unwrap();
+        Self::over(tempfile::tempdir().unwrap(), "127.0.0.1:0", arguments)
+    }
+
+    /// Kills it and starts another at its address, over what it has kept.
+    pub fn killed_and_started_again(mut self) -> Self {
+        self.end();
+        let folder = std::mem::replace(&mut self.folder, tempfile::tempdir().unwrap());
+        Self::over(folder, self.url.trim_start_matches("http://"), &[])
+    }
+
+    fn over(folder: TempDir, address: &str, arguments: &[&str]) -> Self {
         let mut child = command()
-            .args(["serve", "--listen", "127.0.0.1:0", "--set", "data.keep_free_bytes=0", "--data"])
+            .args(["serve", "--listen", address, "--set", "data.keep_free_bytes=0", "--data"])
             .arg(folder.path().join("data"))
             .args(arguments)
             .stdout(Stdio::piped())
@@ -32,13 +42,18 @@ impl Server {
         let mut lines = BufReader::new(child.stdout.take().unwrap()).lines();
         let line = lines.next().expect("the server says where it listens").unwrap();
         let url = line.strip_prefix("listening on ").unwrap_or_else(|| panic!("{line}")).to_owned();
-        Self { url, child, _folder: folder }
+        Self { url, child, folder }
+    }
+
+    fn end(&mut self) {
+        // It may have ended by itself.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
     }
 }
 
 impl Drop for Server {
     fn drop(&mut self) {
-        let _ = self.child.kill();
-        let _ = self.child.wait();
+        self.end();
     }
 }

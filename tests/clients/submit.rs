@@ -1,6 +1,7 @@
 use std::fs;
+use std::io::{BufRead, BufReader};
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::{Command, Output, Stdio};
 
 use onemesh::demo::{Sculptor, Settings};
 use onemesh::formats::{obj_bytes, write_landmarks};
@@ -113,6 +114,24 @@ fn broken_connections_are_resumed() {
     let output = submit(&server.url, &scans, &whole).output().unwrap();
     assert!(output.status.success() && said(&output).contains("found as"), "{}", said(&output));
     same(&whole, &pieces, &meshes(&names));
+}
+
+#[test]
+fn a_server_that_dies_and_comes_back_is_waited_for() {
+    let folder = tempfile::tempdir().unwrap();
+    let [scans, whole, waited] = ["scans", "whole", "waited"].map(|name| folder.path().join(name));
+    let names = write_collection(&scans, 2);
+    let server = Server::start();
+    let mut begun =
+        submit(&server.url, &scans, &waited).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+    let mut lines = BufReader::new(begun.stderr.take().unwrap()).lines().map_while(Result::ok);
+    assert!(lines.any(|line| line.contains("is asked for")));
+    let server = server.killed_and_started_again();
+    let rest: Vec<String> = lines.collect();
+    assert!(begun.wait().unwrap().success(), "{rest:?}");
+    let output = submit(&server.url, &scans, &whole).output().unwrap();
+    assert!(said(&output).contains("found as"), "{}", said(&output));
+    same(&whole, &waited, &meshes(&names));
 }
 
 #[test]

@@ -151,6 +151,9 @@ fn next_event(reader: &mut impl BufRead) -> std::io::Result<Option<Event>> {
 
 #[cfg(test)]
 mod tests {
+    use std::io::Write;
+    use std::net::TcpListener;
+
     use super::*;
 
     #[test]
@@ -166,5 +169,74 @@ mod tests {
         assert_eq!(second.id, Some(4));
         assert!(matches!(serde_json::from_str(&second.data).unwrap(), Happening::Other));
         assert_eq!(next_event(&mut reader).unwrap(), None);
+    }
+
+    /// Gives these answers, one a connection, to whoever asks.
+    fn server_of(answers: Vec<String>) -> Client {
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let url = format!("http://{}", listener.local_addr().unwrap());
+        std::thread::spawn(move || {
+            for answer in answers {
+                let (mut stream, _) = listener.accept().unwrap();
+                let mut asked = BufReader::new(stream.try_clone().unwrap()).lines();
+                while asked.next().is_some_and(|line| !line.unwrap().is_empty()) {}
+                stream.write_all(answer.as_bytes()).unwrap();
+            }
+        });
+        Client::new(url.parse().unwrap(), None, Duration::from_secs(5))
+    }
+
+    #[derive(Default)]
+    struct Heard {
+        stages: Vec<String>,
+        stands: Vec<f64>,
+    }
+
+    impl Watcher for Heard {
+        fn happened(&mut self, happening: &Happening) {
+            if let Happening::Stage { stage } = happening {
+                self.stages.push(stage.clone());
+            }
+        }
+
+        fn stands(&mut self, registration: &Registration) {
+            self.stands.push(registration.progress);
+        }
+    }
+
+    fn answer(media_type: &str, body: &str) -> String {
+        let length = body.len();
+        format!(
+            "HTTP/1.1 200 OK\r\nContent-Type: {media_type}\r\nContent-Length: {length}\r\nConnection: close\r\n\r\n{body}"
+        )
+    }
+
+    fn registration(status: &str, progress: f64) -> String {
+        let body = serde_json::json!({ "id": "7", "status": status, "progress": progress, "children": [] });
+        answer("application/json", &body.to_string())
+    }
+
+    #[test]
+    fn where_no_events_come_it_is_asked() {
+        let page = answer("text/html", "a proxy that knows no events");
+        let running = registration("running", 0.5);
+        let client = server_of(vec![page, running.clone(), running, registration("succeeded", 1.0)]);
+        let mut heard = Heard::default();
+        let ended = watch(&client, "7", &mut heard).unwrap();
+        assert_eq!((ended.status, heard.stands), (Status::Succeeded, vec![0.5, 0.5]));
+    }
+
+    #[test]
+    fn events_that_break_off_are_heard_on() {
+        let event = |id: u64, stage: &str| {
+            format!("id: {id}\ndata: {{\"event\": \"stage\", \"stage\": \"{stage}\"}}\n\n")
+        };
+        let cut = answer("text/event-stream", &(event(1, "fit") + "id: 2\ndata: {"));
+        let whole = answer("text/event-stream", &event(2, "register"));
+        let client =
+            server_of(vec![cut, registration("running", 0.5), whole, registration("succeeded", 1.0)]);
+        let mut heard = Heard::default();
+        watch(&client, "7", &mut heard).unwrap();
+        assert_eq!(heard.stages, ["fit", "register"]);
     }
 }
