@@ -49,6 +49,18 @@ impl TemplateFiles {
         })
     }
 
+    /// Its files, where one is given: the mesh, and its landmarks unless it is a frozen collection, which holds its own.
+    pub fn files(&self) -> anyhow::Result<Option<(PathBuf, Option<PathBuf>)>> {
+        anyhow::ensure!(
+            self.template_mask.is_none(),
+            "--template-mask: a server takes no mask of a template: use `register`"
+        );
+        let Some(path) = &self.template else { return Ok(None) };
+        let frozen = self.read()?.settings.is_some();
+        let landmarks = self.template_landmarks.clone().or_else(|| beside(path));
+        Ok(Some((path.clone(), landmarks.filter(|_| !frozen))))
+    }
+
     fn of_mesh(&self, source: MeshSource, path: &Path) -> anyhow::Result<GivenTemplate> {
         let landmarks = match self.template_landmarks.clone().or_else(|| beside(path)) {
             Some(landmarks) => LandmarkFile::read(landmarks)?,
