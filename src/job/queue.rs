@@ -46,7 +46,7 @@ pub(super) async fn push(tx: &mut SqliteConnection, steps: usize) -> Result<(), 
     // At the beginning of time: a clock that is set back makes nobody wait.
     let ticket = |_| TaskBuilder::new(b"{}".to_vec()).run_at_timestamp(0).max_attempts(1).build();
     let tickets: Vec<_> = (0..steps).map(ticket).collect();
-    push_tasks(tx, QUEUE, &tickets).await.map_err(|error| super::record::broken(error))
+    push_tasks(tx, QUEUE, &tickets).await.map_err(super::record::broken)
 }
 
 /// Deletes tickets that are used up.

@@ -21,6 +21,7 @@ use crate::pipeline::{
 use crate::preflight::LandmarkAudit;
 
 /// A step with all that it needs.
+#[expect(clippy::large_enum_variant, reason = "one lives at a time, and not for long")]
 pub(super) enum Work {
     /// [`JobStage::Inspect`] of a scan.
     Inspect(Arc<Subject>),
