@@ -1,10 +1,11 @@
 # Works from a fresh checkout on Debian: what is missing is installed first, as root or by sudo.
 
-.PHONY: demo test durability contract bench licences openapi templates rust validator schemathesis
+.PHONY: demo test durability contract bench service-cost licences openapi templates rust validator schemathesis
 
-# The demo collection, registered: meshes, report and picture.
+# The demo collection, registered by a server of its own: meshes, report and picture.
 demo: rust
-	cargo run --release --locked -- demo -o demo
+	cargo build --release --locked
+	scripts/demo $${CARGO_TARGET_DIR:-target}/release/onemesh demo
 
 # Every test there is.
 test: rust validator schemathesis
@@ -17,6 +18,11 @@ durability: rust
 # How long each stage and kernel takes.
 bench: rust
 	cargo run --release --locked -- bench
+
+# Twelve scans over HTTP against the command line's own registration of them; minutes.
+service-cost: rust
+	cargo build --release --locked
+	scripts/service_cost $${CARGO_TARGET_DIR:-target}/release/onemesh
 
 # The head that comes with the program, from the sphere and from other heads than the demo's.
 templates: rust

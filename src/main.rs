@@ -19,6 +19,7 @@ struct Arguments {
 #[derive(Debug, Subcommand)]
 enum Command {
     Register(cli::Register),
+    Submit(cli::Submit),
     Fit(cli::Fit),
     Evaluate(cli::Evaluate),
     Inspect(cli::Inspect),
@@ -28,12 +29,14 @@ enum Command {
     Serve(cli::Serve),
     Key(cli::Key),
     Openapi(cli::Openapi),
+    Health(cli::Health),
 }
 
 fn main() -> ExitCode {
     let Arguments { threads, command } = Arguments::parse();
     cli::finish(threads.apply().and_then(|()| match command {
         Command::Register(command) => command.run(),
+        Command::Submit(command) => command.run(),
         Command::Fit(command) => command.run(),
         Command::Evaluate(command) => command.run(),
         Command::Inspect(command) => command.run(),
@@ -43,5 +46,6 @@ fn main() -> ExitCode {
         Command::Serve(command) => command.run(),
         Command::Key(command) => command.run(),
         Command::Openapi(command) => command.run(),
+        Command::Health(command) => command.run(),
     }))
 }

@@ -5,11 +5,12 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Crates that only some files may name, and where.
-const KEPT: [(&str, &[&str]); 17] = [
+const KEPT: [(&str, &[&str]); 18] = [
     ("nalgebra_sparse", &["numeric/cholesky.rs"]),
     ("clap", &["cli/", "main.rs"]),
     ("anyhow", &["cli/"]),
     ("indicatif", &["cli/"]),
+    ("ureq", &["cli/"]),
     ("axum", &["http/"]),
     ("utoipa", &["http/"]),
     ("utoipa_axum", &["http/"]),

@@ -12,6 +12,7 @@ use serde_json::json;
 
 use super::parameters::Parameters;
 use super::register::{Outcome, register_collection};
+use super::summary::Summary;
 
 /// How far the demo's heads depart from the mean, in turn: natural ones and caricatures.
 const STRENGTHS: [f64; 3] = [1.0, 1.8, 2.6];
@@ -28,6 +29,9 @@ pub struct Demo {
     /// Other heads for another number
     #[arg(long, default_value_t = 1, value_name = "N")]
     seed: u64,
+    /// Sculpts the collection and leaves it at that
+    #[arg(long)]
+    scans_only: bool,
     #[command(flatten)]
     parameters: Parameters,
 }
@@ -39,9 +43,12 @@ impl Demo {
         let heads = Sculptor::new(self.seed).collection(usize::from(self.count), &STRENGTHS);
         let collection = write_heads(&heads, &self.output)?;
         println!("{} heads are sculpted: {}", heads.len(), collection.display());
+        if self.scans_only {
+            return Ok(());
+        }
         let results = self.output.join("result");
         let outcome = register_collection(&collection, &results, None, Outputs::GLB, &settings)?;
-        outcome.print(&results);
+        Summary::of(&results)?.print(&results);
         let figures = correspondence(&heads, &outcome)?;
         if let Some(distances) = figures.distances {
             println!(

@@ -2,11 +2,14 @@
 
 mod audit;
 mod bench;
+mod client;
 mod demo;
+mod difference;
 mod evaluate;
 mod findings;
 mod fit;
 mod formats;
+mod health;
 mod inspect;
 mod key;
 mod logging;
@@ -16,6 +19,8 @@ mod progress;
 mod register;
 mod serve;
 mod service_config;
+mod submit;
+mod summary;
 mod template;
 mod threads;
 
@@ -26,11 +31,13 @@ pub use bench::Bench;
 pub use demo::Demo;
 pub use evaluate::Evaluate;
 pub use fit::Fit;
+pub use health::Health;
 pub use inspect::Inspect;
 pub use key::Key;
 pub use openapi::Openapi;
 pub use register::Register;
 pub use serve::Serve;
+pub use submit::Submit;
 pub use threads::Threads;
 
 /// The exit code where some scans were left out and the others are delivered; wrong arguments have 2.
@@ -42,7 +49,7 @@ pub fn finish(outcome: anyhow::Result<()>) -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("error: {error:#}");
-            if error.is::<register::LeftOut>() { ExitCode::from(PARTIAL) } else { ExitCode::FAILURE }
+            if error.is::<summary::LeftOut>() { ExitCode::from(PARTIAL) } else { ExitCode::FAILURE }
         }
     }
 }

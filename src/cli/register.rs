@@ -4,8 +4,8 @@ use std::time::Instant;
 use anyhow::{Context, ensure};
 use onemesh::formats::{Collection, CollectionError, InputFile, Refused, Scan};
 use onemesh::pipeline::{
-    FailedScan, Outputs, Package, Registration, Report, Settings, Subject, Template, Verdict, leave_out,
-    precheck, register, register_to, spare_inputs,
+    FailedScan, Outputs, Package, Registration, Report, Settings, Subject, Template, leave_out, precheck,
+    register, register_to, spare_inputs,
 };
 use rayon::prelude::*;
 
@@ -13,6 +13,7 @@ use super::findings::warn;
 use super::formats::Formats;
 use super::parameters::Parameters;
 use super::progress::ProgressBars;
+use super::summary::Summary;
 use super::template::{GivenTemplate, TemplateFiles};
 
 /// Registers a collection: the same triangles on every scan.
@@ -46,29 +47,11 @@ impl Register {
         };
         let formats = self.formats.of_registration(source.as_ref())?;
         let outputs = Outputs { formats: &formats, source: source.as_ref() };
-        let outcome =
-            register_collection(&self.collection, &self.output, template.as_ref(), outputs, &settings)?;
-        outcome.print(&self.output);
-        let failed = outcome.report.count(Verdict::Fail);
-        ensure!(
-            failed < outcome.report.scans.len(),
-            "{}: no result can be used: {}",
-            self.collection.display(),
-            if failed == 1 { "the only one failed".to_owned() } else { format!("all {failed} failed") }
-        );
-        match outcome.report.failed.len() {
-            0 => Ok(()),
-            failed => Err(LeftOut { failed, of: failed + outcome.subjects.len() }.into()),
-        }
+        register_collection(&self.collection, &self.output, template.as_ref(), outputs, &settings)?;
+        let summary = Summary::of(&self.output)?;
+        summary.print(&self.output);
+        summary.conclude(&self.collection, 0)
     }
-}
-
-/// Some scans were left out, the others are delivered.
-#[derive(Debug, thiserror::Error)]
-#[error("{failed} of {of} scans are left out, see `failed` in report.json; the others are delivered")]
-pub struct LeftOut {
-    failed: usize,
-    of: usize,
 }
 
 /// A registered collection that has been written.
@@ -169,34 +152,5 @@ impl Reading {
         self.failed.extend(left_out);
         self.failed.sort_by(|a, b| a.name.cmp(&b.name));
         Self { subjects, inputs, failed: self.failed }
-    }
-}
-
-impl Outcome {
-    /// Says how it went and where the results are.
-    pub fn print(&self, output: &Path) {
-        let widest = self.report.scans.iter().map(|scan| scan.name.len()).max().unwrap_or(0);
-        for scan in &self.report.scans {
-            let fidelity = &scan.fidelity;
-            let median = fidelity.scan_to_mesh.map_or(f64::NAN, |distances| distances.p50);
-            let worst = fidelity.scan_to_mesh.map_or(f64::NAN, |distances| distances.p99);
-            println!(
-                "{:widest$}  {:6}  distance median {median:.3e}, 99 % {worst:.3e}; landmarks {:.3e}; flipped {:.2} %, sliver {:.2} %",
-                scan.name,
-                scan.verdict,
-                scan.landmark_mean,
-                100.0 * fidelity.flipped,
-                100.0 * fidelity.sliver,
-            );
-            for reason in &scan.reasons {
-                println!("{:widest$}  - {}: {reason}", "", reason.verdict);
-            }
-        }
-        let seconds: f64 = self.report.seconds.values().sum();
-        let [pass, review, fail] =
-            [Verdict::Pass, Verdict::Review, Verdict::Fail].map(|verdict| self.report.count(verdict));
-        println!("{pass} pass, {review} to review, {fail} failed");
-        println!("{} scans in {seconds:.1} s: {}", self.report.scans.len(), output.display());
-        println!("look at {}", output.join("sheet.png").display());
     }
 }

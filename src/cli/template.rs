@@ -40,6 +40,14 @@ impl TemplateFiles {
         })
     }
 
+    /// Its files, where one is given: the mesh, and its landmarks unless it is a frozen collection, which holds its own.
+    pub fn files(&self) -> anyhow::Result<Option<(PathBuf, Option<PathBuf>)>> {
+        let Some(path) = &self.template else { return Ok(None) };
+        let frozen = self.read()?.settings.is_some();
+        let landmarks = self.template_landmarks.clone().or_else(|| beside(path));
+        Ok(Some((path.clone(), landmarks.filter(|_| !frozen))))
+    }
+
     fn of_mesh(&self, path: &Path) -> anyhow::Result<GivenTemplate> {
         let source = MeshSource::read(path)?;
         let landmarks = match self.template_landmarks.clone().or_else(|| beside(path)) {
