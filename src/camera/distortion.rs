@@ -68,7 +68,8 @@ impl Distortion {
             let off = self.distort(direction) - seen;
             let jacobian = self.jacobian(direction);
             // Where the formula has turned back, what it gives is no picture.
-            if !(jacobian.determinant() > 0.0) {
+            let turned_back = jacobian.determinant() <= 0.0 || !off.is_finite();
+            if turned_back {
                 return None;
             }
             if off.length() < CLOSE {

@@ -46,7 +46,7 @@ impl Pose {
         let lengths = [axes.x_axis, axes.y_axis, axes.z_axis].map(|axis| axis.length());
         let longest = lengths.into_iter().fold(0.0, f64::max);
         let volume = axes.determinant();
-        if !(volume.abs() > SPANNED * longest.powi(3)) {
+        if volume.abs() <= SPANNED * longest.powi(3) {
             return Err(PoseError::Singular);
         }
         if volume < 0.0 {

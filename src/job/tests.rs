@@ -440,7 +440,8 @@ async fn what_is_asked_for_wrongly_is_refused_by_its_field() {
             other => format!("{other:?}"),
         }
     };
-    let cases: [(&str, &dyn Fn(&mut NewRegistration)); 9] = [
+    type Change<'a> = dyn Fn(&mut NewRegistration) + 'a;
+    let cases: [(&str, &Change); 9] = [
         ("scans: are 0", &|new| new.scans.clear()),
         ("scans: are 3", &|new| new.scans = members.clone()),
         ("scans[0]: scan", &|new| new.scans[0].scan = bare.clone()),

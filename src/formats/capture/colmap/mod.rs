@@ -56,7 +56,8 @@ fn frame(image: PlacedImage, lenses: &Lenses) -> Result<Frame, Fault> {
     };
     let rotation = DQuat::from_xyzw(x, y, z, w);
     let translation = DVec3::from(translation);
-    if !(rotation.is_finite() && rotation.length() > 1e-6) || !translation.is_finite() {
+    let turns = rotation.is_finite() && rotation.length() > 1e-6;
+    if !turns || !translation.is_finite() {
         return Err(Fault::at(place, "has a quaternion of no length or a number that is not finite"));
     }
     let pose = Pose { rotation: DMat3::from_quat(rotation.normalize()), translation };
