@@ -1,6 +1,6 @@
 # Works from a fresh checkout on Debian: what is missing is installed first, as root or by sudo.
 
-.PHONY: demo test durability bench service-cost licences templates rust validator
+.PHONY: demo test durability contract bench service-cost licences openapi templates pictures rust validator schemathesis
 
 # The demo collection, registered by a server of its own: meshes, report and picture.
 demo: rust
@@ -8,7 +8,7 @@ demo: rust
 	scripts/demo $${CARGO_TARGET_DIR:-target}/release/onemesh demo
 
 # Every test there is.
-test: rust validator
+test: rust validator schemathesis
 	cargo test --workspace --locked
 
 # The server killed twenty times in the middle of twelve scans; minutes.
@@ -28,6 +28,19 @@ service-cost: rust
 templates: rust
 	cargo run --release --locked -- demo --seed 7 --count 12 --set from_head=false -o target/head
 	cp target/head/result/template.frozen.glb templates/head68.glb
+
+# The README's pictures of what else goes in.
+pictures: rust
+	cargo run --release --locked --example pictures
+
+# The service against its own OpenAPI document, with many generated requests.
+contract: rust schemathesis
+	cargo build --locked
+	SCHEMATHESIS=$(CURDIR)/target/schemathesis/bin/schemathesis tests/contract/run target/debug/onemesh 100
+
+# The OpenAPI document, anew.
+openapi: rust
+	cargo run --locked -- openapi >openapi/onemesh.v1.json
 
 # Whether every dependency's licence leaves users the choice of ours.
 licences: rust
@@ -54,4 +67,14 @@ validator:
 
 tests/gltf_validator/node_modules: tests/gltf_validator/package-lock.json
 	npm ci --no-audit --no-fund --prefix $(@D)
+	@touch $@
+
+# The same of schemathesis, where python cannot be had.
+schemathesis:
+	@command -v python3 >/dev/null || $(call apt,python3 python3-venv) || true
+	@! command -v python3 >/dev/null || $(MAKE) -s target/schemathesis/bin/schemathesis || true
+
+target/schemathesis/bin/schemathesis: tests/contract/requirements.txt
+	{ python3 -m venv target/schemathesis || { $(call apt,python3-venv) && python3 -m venv target/schemathesis; }; } && \
+		target/schemathesis/bin/pip install -q --disable-pip-version-check -r $<
 	@touch $@

@@ -7,7 +7,7 @@
 //! | layer | modules | what they know |
 //! |---|---|---|
 //! | L0 | mesh | triangles, normals and edge lengths with their pull-backs, landmarks, template spheres |
-//! | L1 | numeric | sparse Cholesky, rotations between point sets, the optimiser; `numeric/cholesky` alone names nalgebra_sparse |
+//! | L1 | numeric, camera | sparse Cholesky, rotations between point sets, the optimiser; `numeric/cholesky` alone names nalgebra_sparse; what cameras see |
 //! | L2 | spatial, reparam, energy, density, formats, picture, demo | nearest points, self-intersections; u and p; the terms that are minimised; target edge lengths; files; pictures; sculpted heads |
 //! | L3 | evaluate, preflight | figures of a result on its scan and across a collection; what is wrong with scans and landmarks |
 //! | L4 | pipeline | the stages, their parameters, what they leave behind |
@@ -44,6 +44,7 @@
 //! | (22) | landmark loss, registration | `energy/landmark.rs`, `pipeline/register.rs` |
 //! | ours | foldover, the groupwise stage | `energy/foldover.rs`, `pipeline/groupwise/` |
 
+pub mod camera;
 pub mod demo;
 pub mod density;
 pub mod energy;

@@ -5,7 +5,9 @@ use onemesh::demo::{Sculptor, Settings as Clay};
 use onemesh::formats::{MeshFile, MeshFormat, obj_bytes};
 use onemesh::mesh::{Icosphere, LandmarkSet, TriangleMesh};
 use onemesh::numeric::Similarity;
-use onemesh::pipeline::{Preset, Settings, Subject, Template, register_to};
+use onemesh::pipeline::{
+    Preset, Registration, ScanReport, Settings, Subject, Template, precheck, register_to,
+};
 
 /// The middle of an eye's rim: the right eye's landmarks begin at 36, the left one's at 42.
 fn eye(landmarks: &LandmarkSet, first: usize) -> DVec3 {
@@ -56,11 +58,31 @@ fn eyeballs_keep_their_shape_and_stay_behind_the_eyes() {
     let mut settings = Settings::preset(Preset::Default, 642).unwrap();
     settings.set("transfer.iterations", "8").unwrap();
     let registered = register_to(&with_balls, std::slice::from_ref(&subject), &settings, &()).unwrap();
-    let alone = register_to(&bare, &[subject], &settings, &()).unwrap();
+    let alone = register_to(&bare, std::slice::from_ref(&subject), &settings, &()).unwrap();
     let result = &registered.members[0];
     assert_eq!(result.len(), positions.len());
     assert_eq!(registered.template.triangles, with_balls.triangles);
     assert!(result[2 * count..positions.len() - 1] == alone.members[0], "balls pull at nothing");
+
+    // Nor do they count for how well the result lies on a scan that has none.
+    let check = precheck(std::slice::from_ref(&subject)).remove(0);
+    let report = |registered: &Registration, template: &Template| {
+        let mesh = TriangleMesh::new(registered.members[0].clone(), template.triangles.clone()).unwrap();
+        ScanReport::of(&subject, &check, &mesh, &registered.confidence[0], template)
+    };
+    let [with, without] = [report(&registered, &with_balls), report(&alone, &bare)];
+    assert_eq!(with.fidelity.mesh_to_scan, without.fidelity.mesh_to_scan);
+    assert_eq!((with.fidelity.flipped, with.coverage), (without.fidelity.flipped, without.coverage));
+    assert_eq!(with.fidelity.residuals.len(), positions.len());
+
+    // What a mask leaves out of the scan counts neither: half of the head is gone, and the rest is lain on as before.
+    let half = subject.mesh.centroid().x;
+    let mask = subject.mesh.positions().iter().map(|p| if p.x < half { 0.0 } else { 1.0 }).collect();
+    let masked = Subject { mask: Some(mask), ..subject.clone() };
+    let mesh = TriangleMesh::new(alone.members[0].clone(), bare.triangles.clone()).unwrap();
+    let report = ScanReport::of(&masked, &check, &mesh, &alone.confidence[0], &bare).fidelity;
+    assert!((report.overlap.mesh_over_scan - 0.5).abs() < 0.1, "{:?}", report.overlap);
+    assert!(report.mesh_to_scan.unwrap().p99 < 2.0 * without.fidelity.mesh_to_scan.unwrap().p99);
 
     let names: Vec<String> = (0..68).map(|at| at.to_string()).collect();
     let points = |set: &LandmarkSet| names.iter().map(|name| set.get(name).unwrap()).collect::<Vec<_>>();

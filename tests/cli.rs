@@ -119,6 +119,8 @@ fn one_scan_is_fitted_and_measured() {
     let printed: Value = serde_json::from_str(&succeeded(&onemesh(arguments.iter().chain(&quick)))).unwrap();
     assert_eq!(printed["vertices"], 642);
     validate(&mesh);
+    let known = fs::read(&mesh).unwrap();
+    assert!(known.windows(13).any(|window| window == b"\"_CONFIDENCE\""));
     let formats = ["--format", "obj,ply"].map(Path::new);
     succeeded(&onemesh(arguments.iter().chain(&quick).chain(&formats)));
     let others = ["obj", "ply"].map(|extension| read_mesh(mesh.with_extension(extension)).unwrap());
@@ -302,7 +304,11 @@ fn results_are_in_the_template_s_own_file() {
     let head = read_mesh(scans.join(&names[0]).join("scan.ply")).unwrap();
     let text =
         String::from_utf8(obj_bytes(&head)).unwrap().replacen("f ", "# by hand\ng face\nusemtl skin\nf ", 1);
+    let face = text.lines().find(|line| line.starts_with("f ")).unwrap();
+    let textured = face.replace(' ', "/1 ").replacen("f/1", "f", 1) + "/1";
+    let text = format!("mtllib own.mtl\nvt 0 0\n{}", text.replacen(face, &textured, 1));
     fs::write(&template, &text).unwrap();
+    fs::write(folder.path().join("own.mtl"), "newmtl skin\nmap_Kd skin.png\n").unwrap();
     fs::copy(scans.join(&names[0]).join("landmarks.json"), folder.path().join("own.landmarks.json")).unwrap();
     let register = |more: &[&str]| {
         let fixed =
@@ -323,6 +329,8 @@ fn results_are_in_the_template_s_own_file() {
         assert_eq!(rest(&written), rest(&text));
         assert_ne!(written, text);
     }
+    let materials = [&out, folder.path()].map(|folder| fs::read(folder.join("own.mtl")).unwrap());
+    assert_eq!(materials[0], materials[1]);
     let manifest = json(out.join("manifest.json"));
     assert_eq!(manifest["scans"][0]["outputs"][1]["file"], format!("{}.obj", names[0]));
 

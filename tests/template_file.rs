@@ -101,6 +101,19 @@ fn an_obj_keeps_all_but_its_numbers() {
 }
 
 #[test]
+fn materials_and_pictures_come_along() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::create_dir(folder.path().join("maps")).unwrap();
+    fs::write(folder.path().join("maps/skin.png"), b"no picture is looked at").unwrap();
+    fs::write(folder.path().join("own.mtl"), b"newmtl skin\nmap_Kd maps/skin.png\n").unwrap();
+    let text = "mtllib own.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nusemtl skin\nf 1/1 2/1 3/1\n";
+    let source = source(folder.path(), "flat.obj", text.as_bytes());
+    let names: Vec<_> = source.companions().into_iter().collect();
+    let expected = ["maps/skin.png", "own.mtl"].map(|name| (name.into(), folder.path().join(name)));
+    assert_eq!(names, expected);
+}
+
+#[test]
 fn normals_that_vertices_share_stay() {
     let folder = tempfile::tempdir().unwrap();
     let text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\nf 1//1 2//1 3//1\n";

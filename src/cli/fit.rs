@@ -6,7 +6,7 @@ use glam::DVec3;
 use onemesh::evaluate::{Fidelity, surface_figures};
 use onemesh::formats::{read_mesh, write_whole};
 use onemesh::mesh::{Icosphere, Topology, TriangleMesh, sphere_layout};
-use onemesh::pipeline::{ResultMesh, fit_scan};
+use onemesh::pipeline::{ResultMesh, ScanSurface, confidence, fit_scan};
 
 use super::formats::Formats;
 use super::parameters::Parameters;
@@ -44,11 +44,14 @@ impl Fit {
         // Without landmarks the scan is taken to look along +Z.
         let layout = sphere_layout(&topology, &sphere.positions, DVec3::Z, DVec3::Y);
         let residuals = Fidelity::of(&scan, &mesh).residuals;
+        let surface = ScanSurface::new(&scan, 1);
+        let unit: Vec<_> = mesh.positions().iter().map(|p| surface.to_unit(*p)).collect();
+        let known: Vec<f64> = confidence(&surface, &topology, &unit).into_iter().map(f64::from).collect();
         let result = ResultMesh {
             name: &name,
             mesh: &mesh,
             texture_coordinates: Some(&layout),
-            figures: vec![("residual", &residuals)],
+            figures: vec![("residual", &residuals), ("confidence", &known)],
             extras: serde_json::Value::Null,
         };
         for (format, path) in outputs {

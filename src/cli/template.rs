@@ -1,7 +1,7 @@
 use std::path::{Path, PathBuf};
 
-use anyhow::Context;
-use onemesh::formats::{LandmarkFile, MeshSource};
+use anyhow::{Context, ensure};
+use onemesh::formats::{LandmarkFile, MaskFile, MeshSource};
 use onemesh::pipeline::{FrozenCollection, Settings, Template};
 
 /// A template of the user's.
@@ -13,6 +13,10 @@ pub struct TemplateFiles {
     /// The template's landmarks, where they do not lie in the file or beside it under its name
     #[arg(long, value_name = "FILE", requires = "template")]
     template_landmarks: Option<PathBuf>,
+    /// How much each vertex of the template takes of the scans' data: a JSON of weights, spheres or a colour, or a
+    /// painted PNG, as masks of scans are
+    #[arg(long, value_name = "FILE", requires = "template")]
+    template_mask: Option<PathBuf>,
 }
 
 /// What a template brings.
@@ -34,22 +38,31 @@ impl TemplateFiles {
         let bytes = std::fs::read(path).with_context(shown)?;
         Ok(match FrozenCollection::parse(&bytes).with_context(shown)? {
             Some(FrozenCollection { template, settings }) => {
+                ensure!(
+                    self.template_mask.is_none(),
+                    "{}: is a frozen collection, which keeps its own mask: leave --template-mask out",
+                    path.display()
+                );
                 GivenTemplate { template: Some(template), settings: Some(settings), source: None }
             }
-            None => self.of_mesh(path)?,
+            None => self.of_mesh(MeshSource::of_bytes(path, bytes)?, path)?,
         })
     }
 
-    /// Its files, where one is given: the mesh, and its landmarks unless it is a frozen collection, which holds its own.
+    /// Its files for a server, where one is given: the mesh, and its landmarks unless it is a frozen collection, which
+    /// holds its own.
     pub fn files(&self) -> anyhow::Result<Option<(PathBuf, Option<PathBuf>)>> {
         let Some(path) = &self.template else { return Ok(None) };
+        ensure!(
+            self.template_mask.is_none(),
+            "--template-mask: servers take none; use `register`, or the template.frozen.glb of a collection with the mask"
+        );
         let frozen = self.read()?.settings.is_some();
         let landmarks = self.template_landmarks.clone().or_else(|| beside(path));
         Ok(Some((path.clone(), landmarks.filter(|_| !frozen))))
     }
 
-    fn of_mesh(&self, path: &Path) -> anyhow::Result<GivenTemplate> {
-        let source = MeshSource::read(path)?;
+    fn of_mesh(&self, source: MeshSource, path: &Path) -> anyhow::Result<GivenTemplate> {
         let landmarks = match self.template_landmarks.clone().or_else(|| beside(path)) {
             Some(landmarks) => LandmarkFile::read(landmarks)?,
             None => anyhow::bail!(
@@ -59,7 +72,10 @@ impl TemplateFiles {
             ),
         };
         let landmarks = landmarks.on(&source.file).with_context(|| path.display().to_string())?;
-        let template = Template::of_file(&source.file, &landmarks);
+        let mask = self.template_mask.as_ref().map(|mask| {
+            MaskFile::read(mask)?.on(&source.file, &landmarks).with_context(|| mask.display().to_string())
+        });
+        let template = Template { mask: mask.transpose()?, ..Template::of_file(&source.file, &landmarks) };
         Ok(GivenTemplate { template: Some(template), settings: None, source: Some(source) })
     }
 }

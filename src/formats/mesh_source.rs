@@ -1,4 +1,5 @@
-use std::path::Path;
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 
@@ -7,6 +8,7 @@ use super::geometry::Numbers;
 use super::input::{self, InputFile, Siblings};
 use super::mesh_file::MeshFile;
 use super::mesh_format::MeshFormat;
+use super::texture::TextureImage;
 use super::{gltf, obj, ply};
 
 /// A mesh file that can be written again with its vertices elsewhere and everything else as it is.
@@ -27,7 +29,15 @@ impl MeshSource {
     /// As [`MeshFile::read`].
     pub fn read(path: impl AsRef<Path>) -> Result<Self, FormatError> {
         let path = path.as_ref();
-        let bytes = input::read_file(path)?;
+        Self::of_bytes(path, input::read_file(path)?)
+    }
+
+    /// The file at `path`, which holds `bytes`, as [`read`](Self::read) does.
+    ///
+    /// # Errors
+    /// As [`MeshFile::read`].
+    pub fn of_bytes(path: impl AsRef<Path>, bytes: Vec<u8>) -> Result<Self, FormatError> {
+        let path = path.as_ref();
         let (file, format, inputs) = MeshFile::of_bytes(&bytes, path)?;
         let bytes = match format {
             MeshFormat::Gltf => gltf::embed(&bytes, &Siblings::of(path))
@@ -35,6 +45,24 @@ impl MeshSource {
             _ => bytes,
         };
         Ok(Self { file, inputs, format, bytes })
+    }
+
+    /// The files that it names and that a copy of it needs beside it, of materials and pictures: the name that it has
+    /// for each, from its own folder, and where each is. A glTF has its own within it.
+    pub fn companions(&self) -> Vec<(PathBuf, PathBuf)> {
+        if self.format == MeshFormat::Gltf {
+            return Vec::new();
+        }
+        let [own, read @ ..] = &self.inputs[..] else { return Vec::new() };
+        let folder = own.path.parent().unwrap_or(Path::new(""));
+        let pictures = self.file.texture.iter().flat_map(|texture| &texture.images);
+        let pictures = pictures.filter_map(|image| match image {
+            TextureImage::File(path) => Some(path),
+            TextureImage::Embedded { .. } => None,
+        });
+        let paths: BTreeSet<&PathBuf> = read.iter().map(|input| &input.path).chain(pictures).collect();
+        let named = |path: &PathBuf| Some((path.strip_prefix(folder).ok()?.to_owned(), path.clone()));
+        paths.into_iter().filter_map(named).collect()
     }
 
     /// The extension of files of its format: `obj`, `ply`, `stl`, `glb` or `gltf`.

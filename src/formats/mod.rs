@@ -1,9 +1,10 @@
-//! Files in and out: meshes, landmarks and whole collections. Layer 2: imports `mesh` alone.
+//! Files in and out: meshes, landmarks and whole collections. Layer 2: imports `mesh`, and `camera` for captures.
 //!
 //! Readers trust nothing that a file says of itself: every count is held against the bytes that are there before
 //! memory is taken for it, so that memory stays within a small multiple of the file's size, and no input panics.
 
 mod area_normals;
+mod capture;
 mod collection;
 mod digest;
 mod error;
@@ -30,6 +31,7 @@ mod weld;
 
 use std::path::Path;
 
+pub use capture::{Capture, CaptureView};
 pub use collection::{Collection, CollectionError, Member, Refused, Scan};
 pub use digest::Sha256;
 pub use error::{Fault, FormatError};

@@ -56,8 +56,14 @@ pub async fn replay(State(app): State<App>, request: Request, next: Next) -> Res
     match app.idempotency.begin(&owner, &key, &said).await? {
         Known::New => {
             // A client that hangs up does not stop the work, whose answer it may come back for.
-            let work = tokio::spawn(first(app, owner, key, request, next));
-            work.await.unwrap_or_else(|_| Err(Problem::new(Kind::Internal, "the request crashed")))
+            let work = tokio::spawn(first(app.clone(), owner.clone(), key.clone(), request, next));
+            match work.await {
+                Ok(answer) => answer,
+                Err(_) => {
+                    app.idempotency.release(&owner, &key).await?;
+                    Err(Problem::new(Kind::Internal, "the request crashed, which is a fault of ours"))
+                }
+            }
         }
         Known::UnderWay => {
             Err(Problem::new(Kind::IdempotencyUnderWay, format!("key `{key}`")).retry_after(1))

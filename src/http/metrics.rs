@@ -1,4 +1,4 @@
-use std::sync::atomic::AtomicU64;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 use prometheus_client::encoding::EncodeLabelSet;
@@ -21,6 +21,8 @@ pub struct Metrics {
     pub registrations: Family<StatusLabels, Gauge>,
     /// Steps that could run or run.
     pub steps: Family<StatusLabels, Gauge>,
+    stage_steps: Family<StageLabels, Counter>,
+    stage_seconds: Family<StageLabels, Counter<f64, AtomicU64>>,
     /// Bytes free on the data folder's disk.
     pub free_bytes: Gauge<f64, AtomicU64>,
 }
@@ -36,6 +38,11 @@ struct RequestLabels {
 struct RouteLabels {
     method: String,
     route: String,
+}
+
+#[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
+struct StageLabels {
+    stage: &'static str,
 }
 
 /// A status.
@@ -58,10 +65,15 @@ impl Metrics {
         registry.register("registrations", "Registrations by status", registrations.clone());
         let steps = Family::default();
         registry.register("steps", "Steps of work that wait for a thread or run", steps.clone());
+        let stage_steps = Family::default();
+        registry.register("stage_steps", "Steps done since the start, by stage", stage_steps.clone());
+        let stage_seconds = Family::default();
+        let help = "Time that they took";
+        registry.register_with_unit("stage", help, Unit::Seconds, stage_seconds.clone());
         let free_bytes = Gauge::default();
         let help = "Free on the data folder's disk";
         registry.register_with_unit("data_folder_free", help, Unit::Bytes, free_bytes.clone());
-        Self { registry, requests, seconds, registrations, steps, free_bytes }
+        Self { registry, requests, seconds, registrations, steps, stage_steps, stage_seconds, free_bytes }
     }
 
     /// Counts a request: by its route, not its path, so that there are few series.
@@ -70,6 +82,14 @@ impl Metrics {
         let labels = RequestLabels { method: method.clone(), route: route.clone(), status };
         self.requests.get_or_create(&labels).inc();
         self.seconds.get_or_create(&RouteLabels { method, route }).observe(took.as_secs_f64());
+    }
+
+    /// Notes how many steps of a stage were done since the start, and how long they took.
+    pub fn set_stage(&self, stage: &'static str, steps: u64, seconds: f64) {
+        let labels = StageLabels { stage };
+        self.stage_steps.get_or_create(&labels).inner().store(steps, Ordering::Relaxed);
+        // The counter keeps the bits of a number.
+        self.stage_seconds.get_or_create(&labels).inner().store(seconds.to_bits(), Ordering::Relaxed);
     }
 
     /// All of it in OpenMetrics' text.

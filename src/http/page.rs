@@ -1,6 +1,8 @@
 use serde::{Deserialize, Serialize};
 use utoipa::{IntoParams, ToSchema};
 
+/// The largest whole number that all of JSON's readers know.
+pub const LAST_PLACE: i64 = (1 << 53) - 1;
 /// Items of a page unless the client says how many.
 const USUAL: u32 = 50;
 
@@ -14,7 +16,7 @@ pub struct PageQuery {
     #[param(minimum = 1, maximum = 200, default = 50)]
     pub limit: u32,
     /// Only what comes after an earlier page: its `next`.
-    #[serde(default)]
+    #[serde(default, deserialize_with = "place")]
     #[param(minimum = 0, maximum = 9007199254740991_i64, nullable = false)]
     pub after: Option<i64>,
 }
@@ -45,6 +47,13 @@ impl<T> Page<T> {
 pub fn usual() -> u32 {
     USUAL
 }
+fn place<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<Option<i64>, D::Error> {
+    match i64::deserialize(deserializer)? {
+        place @ 0..=LAST_PLACE => Ok(Some(place)),
+        other => Err(serde::de::Error::custom(format!("{other} is not the `next` of a page"))),
+    }
+}
+
 /// Reads a page's limit.
 pub fn limit<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<u32, D::Error> {
     match u32::deserialize(deserializer)? {

@@ -1,6 +1,7 @@
 //! Files as they come in: straight to the store, a piece at a time.
 
 use std::collections::BTreeMap;
+use std::fmt::Display;
 use std::time::Duration;
 
 use axum::body::Body;
@@ -51,7 +52,7 @@ impl Upload {
             Some("multipart/form-data") => receive_form(app, request, parts).await,
             Some(ANY) => {
                 let mesh = receive_body(app, request.into_body()).await?;
-                let kind = sniff(app, &mesh, None).await?.ok_or_else(|| unknown_mesh(Some(ANY)))?;
+                let kind = sniff(app, &mesh, None).await?.ok_or_else(|| unknown_content("body"))?;
                 Ok(Self { name: None, kind, mesh, landmarks: None, mask: None, texture: None })
             }
             found => {
@@ -69,9 +70,18 @@ impl Upload {
 /// A [`Problem`]; nothing is kept then.
 pub async fn receive_body(app: &App, body: Body) -> Result<Kept, Problem> {
     check_room(app)?;
-    let kept = app.blobs.put(pieces(app, body), app.config.limits.scan.upload_bytes).await?;
+    store(app, "body", pieces(app, body)).await
+}
+
+/// Stores a file that comes as a field or as the body.
+async fn store<E: Display>(
+    app: &App,
+    field: &str,
+    pieces: impl Stream<Item = Result<Bytes, E>>,
+) -> Result<Kept, Problem> {
+    let kept = app.blobs.put(pieces, app.config.limits.scan.upload_bytes).await?;
     if kept.info.size == 0 {
-        return Err(Problem::of_field(Kind::UnreadableFile, "body", "is empty", "send the file's bytes"));
+        return Err(Problem::of_field(Kind::UnreadableFile, field, "is empty", "send the file's bytes"));
     }
     Ok(kept)
 }
@@ -94,7 +104,7 @@ async fn receive_form(app: &App, request: Request, parts: &[Part]) -> Result<Upl
             return Err(Problem::of_field(Kind::InvalidField, called, "is no field of this form", &remedy));
         };
         let said = (field.content_type().map(str::to_ascii_lowercase), field.file_name().map(str::to_owned));
-        let kept = app.blobs.put(field, app.config.limits.scan.upload_bytes).await?;
+        let kept = store(app, part.name(), field).await?;
         if *part == Part::Mesh {
             kind = said.0.as_deref().and_then(kind_of);
             if kind.is_none() {
@@ -113,10 +123,7 @@ async fn receive_form(app: &App, request: Request, parts: &[Part]) -> Result<Upl
             "send the mesh's file in it",
         ));
     };
-    let kind = kind.ok_or_else(|| {
-        let remedy = "give the field a Content-Type or a file name whose end says it";
-        Problem::of_field(Kind::UnreadableFile, "mesh", "is of no format that is known", remedy)
-    })?;
+    let kind = kind.ok_or_else(|| unknown_content("mesh"))?;
     let mut file = |part: Part| files.remove(part.name());
     let (landmarks, mask, texture) = (file(Part::Landmarks), file(Part::Mask), file(Part::Texture));
     Ok(Upload { name, kind, mesh, landmarks, mask, texture })
@@ -207,6 +214,11 @@ fn unknown_mesh(found: Option<&str>) -> Problem {
     let mut known: Vec<&str> = MeshKind::ALL.map(MeshKind::media_type).to_vec();
     known.extend([ANY, "multipart/form-data"]);
     unsupported(found, &known)
+}
+
+fn unknown_content(field: &str) -> Problem {
+    let remedy = "say what it is by its Content-Type, or by the end of its file name in a form";
+    Problem::of_field(Kind::UnreadableFile, field, "is of no format that is known", remedy)
 }
 
 fn malformed(error: String) -> Problem {

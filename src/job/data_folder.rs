@@ -56,7 +56,8 @@ impl DataFolder {
     /// # Errors
     /// [`StoreError::Folder`] with what the system says.
     pub fn check_writable(&self) -> Result<(), StoreError> {
-        let probe = self.uploads().join("probe");
+        // Several may ask at the same time.
+        let probe = self.uploads().join(format!("probe-{}", uuid::Uuid::new_v4().simple()));
         let write = || {
             std::fs::write(&probe, b"probe")?;
             File::open(&probe)?.sync_all()?;

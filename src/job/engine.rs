@@ -1,7 +1,7 @@
 //! One step from its claim to its end.
 
 use std::collections::{BTreeMap, HashMap};
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -51,8 +51,8 @@ pub(super) struct Engine {
     pub closing: watch::Sender<bool>,
     /// Seconds and number of the steps done, by stage.
     pub spent: Mutex<BTreeMap<&'static str, (u64, f64)>>,
-    /// Steps done since the start.
-    pub steps: AtomicU64,
+    /// Workers that go from step to step.
+    pub busy: AtomicUsize,
 }
 
 /// How a step came to its end.
@@ -90,7 +90,7 @@ impl Engine {
             finished: watch::Sender::new(0),
             closing: watch::Sender::new(false),
             spent: Mutex::default(),
-            steps: AtomicU64::new(0),
+            busy: AtomicUsize::new(0),
         })
     }
 
@@ -254,7 +254,6 @@ impl Engine {
         let done = Done { output: output_digest, files: records, decided, seconds };
         let own = graph::finish(&mut tx, claim, done, &mut changed).await?;
         if own {
-            self.steps.fetch_add(1, Ordering::Relaxed);
             let mut spent = lock(&self.spent);
             let (count, sum) = spent.entry(claim.stage().name()).or_default();
             (*count, *sum) = (*count + 1, *sum + seconds);
@@ -296,7 +295,9 @@ impl Engine {
 
     /// Commits a change with the tickets for the steps that it made ready, and tells of it.
     pub async fn commit(&self, mut tx: Transaction<'_, Sqlite>, changed: Changed) -> Result<(), StoreError> {
-        queue::push(&mut tx, changed.ready).await?;
+        // Workers that are at it go on by themselves.
+        let idle = self.settings.threads.saturating_sub(self.busy.load(Ordering::Relaxed));
+        queue::push(&mut tx, changed.ready.min(idle)).await?;
         tx.commit().await?;
         let dropped = changed.dropped.clone();
         self.cache.forget(&dropped);

@@ -210,11 +210,12 @@ pub(super) async fn end(
     let open = "UPDATE child SET status = ?, problem = coalesce(problem, ?), finished_at = ?
         WHERE registration = ? AND status IN ('queued', 'running') RETURNING scan";
     let of_child = if status == Status::Canceled { Status::Canceled } else { Status::Failed };
-    let problem = problem.map(json);
-    let open = sqlx::query_scalar::<_, String>(open).bind(of_child.name()).bind(&problem);
+    let kept = problem.map(json);
+    let open = sqlx::query_scalar::<_, String>(open).bind(of_child.name()).bind(&kept);
     for scan in open.bind(now()).bind(registration).fetch_all(&mut *tx).await? {
         let scan: ScanId = scan.parse().map_err(broken)?;
-        let event = EventKind::Child { scan, status: of_child, verdict: None, problem: None };
+        let problem = problem.cloned();
+        let event = EventKind::Child { scan, status: of_child, verdict: None, problem };
         changed.events.push(add_event(tx, registration, event).await?);
     }
     let outputs = sqlx::query_scalar::<_, String>(
@@ -227,7 +228,7 @@ pub(super) async fn end(
         output = NULL WHERE registration = ?";
     sqlx::query(drop).bind(registration).execute(&mut *tx).await?;
     let query = "UPDATE registration SET status = ?1, problem = ?2, finished_at = ?3, expires_at = ?3 + keep WHERE sequence = ?4";
-    let query = sqlx::query(query).bind(status.name()).bind(problem).bind(now());
+    let query = sqlx::query(query).bind(status.name()).bind(kept).bind(now());
     query.bind(registration).execute(&mut *tx).await?;
     changed.events.push(add_event(tx, registration, EventKind::Status { status }).await?);
     Ok(())

@@ -201,14 +201,20 @@ impl Jobs {
     /// # Errors
     /// [`JobError::Store`].
     pub async fn list(&self, page: Page) -> Result<Vec<Registration>, JobError> {
+        let reader = self.engine.database.reader();
         let before = match &page.before {
-            Some(id) => self.sequence(id).await?,
+            // Ids sort by time: where that one was deleted meanwhile, those before its time follow.
+            Some(id) => {
+                let query = "SELECT COALESCE((SELECT sequence FROM registration WHERE id = ?1),
+                    (SELECT MAX(sequence) + 1 FROM registration WHERE id < ?1), 0)";
+                sqlx::query_scalar(query).bind(id.as_str()).fetch_one(reader).await?
+            }
             None => i64::MAX,
         };
         let query = "SELECT * FROM registration WHERE sequence < ?1 AND (?2 IS NULL OR status = ?2)
             AND (?3 IS NULL OR owner = ?3) ORDER BY sequence DESC LIMIT ?4";
         let query = sqlx::query(query).bind(before).bind(page.status.map(Status::name)).bind(&page.owner);
-        let rows = query.bind(page.limit as i64).fetch_all(self.engine.database.reader()).await?;
+        let rows = query.bind(page.limit as i64).fetch_all(reader).await?;
         Ok(rows.iter().map(|row| Ok(record::registration(row)?.1)).collect::<Result<_, StoreError>>()?)
     }
 

@@ -4,6 +4,7 @@
 //! on, and starts a worker again that fails.
 
 use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
 use apalis::prelude::*;
@@ -20,9 +21,6 @@ use super::store_error::StoreError;
 const QUEUE: &str = "steps";
 /// How long a worker waits for a sign before it looks for tickets itself.
 const LOOK: Duration = Duration::from_millis(250);
-/// Tickets that are out at most: a worker goes on while there are steps, so that more would find none.
-const MOST: usize = 64;
-
 /// Some step is ready.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 struct Ticket {}
@@ -47,7 +45,7 @@ pub(super) async fn set_up(database: &Database) -> Result<(), StoreError> {
 pub(super) async fn push(tx: &mut SqliteConnection, steps: usize) -> Result<(), StoreError> {
     // At the beginning of time: a clock that is set back makes nobody wait.
     let ticket = |_| TaskBuilder::new(b"{}".to_vec()).run_at_timestamp(0).max_attempts(1).build();
-    let tickets: Vec<_> = (0..steps.min(MOST)).map(ticket).collect();
+    let tickets: Vec<_> = (0..steps).map(ticket).collect();
     push_tasks(tx, QUEUE, &tickets).await.map_err(|error| super::record::broken(error))
 }
 
@@ -140,6 +138,7 @@ pub(super) async fn work(engine: Arc<Engine>) {
 
 /// Does steps as long as there are some.
 async fn take(_ticket: Ticket, engine: Data<Arc<Engine>>) -> Result<(), BoxDynError> {
+    let _busy = Busy::new(&engine.busy);
     loop {
         match engine.turn().await {
             Ok(true) => {}
@@ -149,5 +148,21 @@ async fn take(_ticket: Ticket, engine: Data<Arc<Engine>>) -> Result<(), BoxDynEr
                 return Ok(());
             }
         }
+    }
+}
+
+/// Counts a worker that goes from step to step, until it is dropped.
+struct Busy<'a>(&'a AtomicUsize);
+
+impl<'a> Busy<'a> {
+    fn new(count: &'a AtomicUsize) -> Self {
+        count.fetch_add(1, Ordering::Relaxed);
+        Self(count)
+    }
+}
+
+impl Drop for Busy<'_> {
+    fn drop(&mut self) {
+        self.0.fetch_sub(1, Ordering::Relaxed);
     }
 }

@@ -35,7 +35,8 @@ impl Default for JobSettings {
             jobs_per_owner: 1000,
             step_time: Duration::from_secs(20 * 60),
             job_time: Duration::from_secs(24 * 3600),
-            crashes: 5,
+            // More than bad luck gives one that takes as long as the program lives between two falls.
+            crashes: 10,
             cache_bytes: 512 << 20,
             keep_free: 1 << 30,
             keep: Some(Duration::from_secs(30 * 24 * 3600)),

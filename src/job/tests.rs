@@ -276,16 +276,16 @@ async fn a_scan_that_ends_the_program_again_and_again_fails_alone() {
     let members = service.upload_all(&heads(3)).await;
     let submitted = service.jobs.submit(asked(members)).await.unwrap();
     let folder = service.end().await;
-    // As if the program had ended the fifth time while it inspected the second scan.
+    // As if the program had ended the tenth time while it inspected the second scan.
     let database = Database::open(&folder.path().join("onemesh.db")).await.unwrap();
-    let poison = "UPDATE step SET state = 'running', crashes = 4, runs = 5 WHERE stage = 0 AND place = 1";
+    let poison = "UPDATE step SET state = 'running', crashes = 9, runs = 10 WHERE stage = 0 AND place = 1";
     sqlx::query(poison).execute(database.writer()).await.unwrap();
     database.close().await;
     let service = Service::start_in(folder, settings()).await;
     let ended = service.ended(&submitted).await;
     assert_eq!(ended.status, Status::PartiallySucceeded);
     assert_eq!(ended.children[1].problem.as_ref().unwrap().code, "crashed");
-    assert!(ended.children[1].problem.as_ref().unwrap().detail.contains("5 times"));
+    assert!(ended.children[1].problem.as_ref().unwrap().detail.contains("10 times"));
     assert_eq!([0, 2].map(|at| ended.children[at].status), [Status::Succeeded; 2]);
 }
 
@@ -477,4 +477,21 @@ async fn the_same_key_asks_once_and_what_is_over_goes() {
     assert!(matches!(service.jobs.get(&first.id).await, Err(JobError::NotFound(_))));
     let kept: Vec<_> = futures_util::StreamExt::collect(service.blobs.list()).await;
     assert_eq!(kept.len(), 2, "the scan and its landmarks");
+}
+
+#[tokio::test(flavor = "multi_thread", worker_threads = 2)]
+async fn what_takes_too_long_is_stopped_and_says_so() {
+    let service = Service::start(JobSettings { step_time: Duration::from_millis(300), ..settings() }).await;
+    let members = service.upload_all(&heads(1)).await;
+    let mut long = asked(members.clone());
+    long.parameters.insert("from_head".to_owned(), json!(false));
+    long.parameters.insert("fit.levels.0.iterations".to_owned(), json!(20_000));
+    let ended = service.ended(&service.jobs.submit(long).await.unwrap()).await;
+    assert_eq!(ended.status, Status::Failed);
+    assert_eq!(ended.children[0].problem.as_ref().unwrap().code, "too_slow");
+    assert_eq!(ended.problem.as_ref().unwrap().code, "no_scan_left");
+    let folder = service.end().await;
+    let service = Service::start_in(folder, JobSettings { job_time: Duration::ZERO, ..settings() }).await;
+    let ended = service.ended(&service.jobs.submit(asked(members)).await.unwrap()).await;
+    assert_eq!((ended.status, ended.problem.unwrap().code.as_str()), (Status::Failed, "too_slow"));
 }

@@ -12,10 +12,11 @@ use super::scan::ScanId;
 use super::stage::JobStage;
 use crate::formats::Sha256;
 use crate::pipeline::{
-    BadState, ComparisonRow, FailedScan, FrozenCollection, InputEntry, Inspected, LandmarkEntry, MOST_ROWS,
-    Manifest, Observer, OutputEntry, OutputFormat, Placed, Plan, PlanStage, Precheck, Prepared,
-    RegisterError, Report, ScanEntry, ScanResult, ScanState, Settings, SharedState, Subject, Template,
-    Verdict, comparison_row, comparison_sheet, decode, encode, leave_out, precheck_inspected, record_bytes,
+    BadState, ComparisonRow, FailedScan, FrozenCollection, InputEntry, Inspected, LandmarkEntry,
+    LandmarkWeights, MOST_ROWS, Manifest, Observer, OutputEntry, OutputFormat, Placed, Plan, PlanStage,
+    Precheck, Prepared, RegisterError, Report, ScanEntry, ScanResult, ScanState, Settings, SharedState,
+    Subject, Template, Verdict, comparison_row, comparison_sheet, decode, encode, leave_out,
+    precheck_inspected, record_bytes,
 };
 use crate::preflight::LandmarkAudit;
 
@@ -233,6 +234,7 @@ impl PlanWork {
                 .map_or(String::new(), |failed| format!(": `{}` {}", failed.name, failed.problem));
             return Err(Fault::problem("too_few_landmarks", format!("no scan can be registered{why}")));
         }
+        let (prechecks, audit) = precheck_inspected(&kept);
         let plan = match &self.template {
             Some(template) => Plan::from_template(template, kept.len(), &self.settings)?,
             None => {
@@ -240,7 +242,7 @@ impl PlanWork {
                 Plan::new(&landmarks, &self.settings)?
             }
         };
-        let (prechecks, audit) = precheck_inspected(&kept);
+        let plan = plan.weighing(LandmarkWeights::of(|| audit.clone(), &self.settings));
         let places = self.scans.iter().filter(|(_, name, _)| stays(name)).map(|(place, ..)| *place);
         let judged = Judged { prechecks: places.zip(prechecks).collect(), audit };
         let decided = Decided::Course(JobStage::all_of(&plan), gone);

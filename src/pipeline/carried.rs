@@ -81,6 +81,22 @@ impl Parts {
     }
 }
 
+/// The triangles of the template that are held against scans: those of components with landmarks, and of these not
+/// where a mask takes nothing. All of them if that leaves none.
+pub(super) fn matched_triangles(template: &Template) -> Vec<[u32; 3]> {
+    let component = components(template.positions.len(), &template.triangles);
+    let mut has_landmark = vec![template.landmarks.is_empty(); template.positions.len()];
+    for at in template.landmarks.values() {
+        has_landmark[component[template.triangles[at.triangle.0 as usize][0] as usize] as usize] = true;
+    }
+    let takes = |i: u32| template.mask.as_ref().is_none_or(|mask| mask[i as usize] > 0.0);
+    let matched = |corners: &&[u32; 3]| {
+        has_landmark[component[corners[0] as usize] as usize] && corners.iter().all(|&i| takes(i))
+    };
+    let triangles: Vec<[u32; 3]> = template.triangles.iter().filter(matched).copied().collect();
+    if triangles.is_empty() { template.triangles.clone() } else { triangles }
+}
+
 /// The component of each vertex `[N]`, called by a vertex of it; N for vertices without a triangle.
 fn components_with_triangles(template: &Template) -> Vec<u32> {
     let vertices = template.positions.len();
@@ -113,13 +129,17 @@ fn part(whole: &Template, vertices: &[u32]) -> Template {
         at.triangle.0 = triangle_number[at.triangle.0 as usize];
         (name.clone(), at)
     };
-    let of_vertices = |uv: &Vec<_>| vertices.iter().map(|&vertex| uv[vertex as usize]).collect();
     Template {
         positions: vertices.iter().map(|&vertex| whole.positions[vertex as usize]).collect(),
         triangles,
         landmarks: whole.landmarks.iter().map(moved).collect(),
         scheme: whole.scheme.clone(),
-        texture_coordinates: whole.texture_coordinates.as_ref().map(of_vertices),
+        texture_coordinates: whole.texture_coordinates.as_ref().map(|uv| those(uv, vertices)),
+        mask: whole.mask.as_ref().map(|mask| those(mask, vertices)),
         frozen: whole.frozen,
     }
+}
+
+fn those<T: Copy>(values: &[T], vertices: &[u32]) -> Vec<T> {
+    vertices.iter().map(|&vertex| values[vertex as usize]).collect()
 }

@@ -25,6 +25,8 @@ pub struct SphereLandmark {
     pub on_sphere: glam::DVec3,
     /// The scan's landmark.
     pub target: Vec3A,
+    /// How much it counts.
+    pub weight: f64,
 }
 
 /// Deforms the sphere to a scan, level after level; returns positions `[N, 3]` in unit space on the last level's sphere.
@@ -70,7 +72,11 @@ fn fit_levels(
 
 fn landmark_pulls(sphere: &Sphere, landmarks: &[SphereLandmark]) -> Vec<LandmarkPull> {
     let points: Vec<SurfacePoint> = sphere.surface_points(landmarks.iter().map(|l| l.on_sphere));
-    points.iter().zip(landmarks).map(|(point, l)| LandmarkPull::new(point, l.target)).collect()
+    points
+        .iter()
+        .zip(landmarks)
+        .map(|(point, l)| LandmarkPull { weight: l.weight as f32, ..LandmarkPull::new(point, l.target) })
+        .collect()
 }
 
 /// One level's optimisation: AdamUniform on u, the energies of the paper and ours.

@@ -2,6 +2,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
+use super::mask::check_mask;
 use super::package::vertex_normals;
 use super::settings::Settings;
 use super::template::Template;
@@ -47,6 +48,8 @@ struct Extras {
 struct Frozen {
     record: u32,
     settings: Settings,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    mask: Option<Vec<f32>>,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -75,7 +78,7 @@ impl FrozenCollection {
         let extras = Extras {
             scheme: template.scheme.clone(),
             landmarks: template.landmarks.iter().map(landmark).collect(),
-            frozen: Frozen { record: RECORD, settings: self.settings.clone() },
+            frozen: Frozen { record: RECORD, settings: self.settings.clone(), mask: template.mask.clone() },
         };
         let glb = Glb {
             name: "template",
@@ -101,12 +104,17 @@ impl FrozenCollection {
             return Err(FrozenError::Record(format!("is of version {}", extras.frozen.record)));
         }
         let file = MeshFile::parse(bytes, MeshFormat::Gltf)?;
+        if let Some(mask) = &extras.frozen.mask {
+            let checked = check_mask(mask, file.mesh.positions().len());
+            checked.map_err(|error| FrozenError::Record(format!("its mask {error}")))?;
+        }
         let template = Template {
             positions: file.mesh.positions().to_vec(),
             triangles: file.mesh.triangles().to_vec(),
             landmarks: places(extras.landmarks, &file.mesh)?,
             scheme: extras.scheme,
             texture_coordinates: file.vertex_texture_coordinates(),
+            mask: extras.frozen.mask,
             frozen: true,
         };
         Ok(Some(Self { template, settings: extras.frozen.settings }))

@@ -10,7 +10,7 @@ use crate::formats::{InputFile, Sha256};
 use crate::mesh::SurfacePoint;
 
 /// Version of this record.
-const RECORD: u32 = 1;
+const RECORD: u32 = 2;
 
 /// What a folder of results was made from and holds; the same inputs and settings give the same manifest.
 #[derive(Debug, Clone, PartialEq, Serialize)]

@@ -1,8 +1,8 @@
-/// Why weights are no mask of a scan.
+/// Why weights are no mask of a scan or a template.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum MaskError {
     /// Not one for each vertex.
-    #[error("has {weights} weights, but the scan has {vertices} vertices: give one each")]
+    #[error("has {weights} weights, but there are {vertices} vertices: give one each")]
     Length {
         /// How many there are.
         weights: usize,
@@ -18,7 +18,7 @@ pub enum MaskError {
         weight: f32,
     },
     /// No data.
-    #[error("leaves nothing of the scan: every vertex has weight 0")]
+    #[error("leaves nothing: every vertex has weight 0")]
     Nothing,
 }
 

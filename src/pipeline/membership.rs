@@ -157,6 +157,7 @@ mod tests {
                 landmarks: names.iter().map(|&name| (name.to_owned(), at)).collect(),
                 scheme: None,
                 texture_coordinates: None,
+                mask: None,
                 frozen: false,
             }
         };

@@ -1,3 +1,5 @@
+use std::path::PathBuf;
+
 use glam::DVec2;
 use serde_json::Value;
 
@@ -49,6 +51,13 @@ impl Outputs<'_> {
             files.push((format, file));
         }
         files
+    }
+
+    /// The files that results in the template's own format name and need beside them: each one's name in the folder of
+    /// results, and where it is.
+    pub fn companions(&self) -> Vec<(PathBuf, PathBuf)> {
+        let source = self.source.filter(|_| self.formats.contains(&OutputFormat::Template));
+        source.map(MeshSource::companions).unwrap_or_default()
     }
 
     fn extension(&self, format: OutputFormat) -> &'static str {

@@ -31,6 +31,8 @@ pub const REPORT: &str = "report.json";
 pub const SHEET: &str = "sheet.png";
 /// What further scans are registered from.
 pub const TEMPLATE: &str = "template.frozen.glb";
+/// The files that are not of one scan.
+const OWN: [&str; 4] = [MANIFEST, REPORT, SHEET, TEMPLATE];
 
 /// A registered collection on its way to disk.
 #[derive(Debug, Clone)]
@@ -72,6 +74,19 @@ pub enum PackageError {
         /// The file.
         path: PathBuf,
     },
+    /// A file that the template names cannot lie beside the results.
+    #[error(
+        "{}: is named by the template, and cannot be copied to {}: {problem}; or leave `template` out of --format",
+        path.display(), to.display()
+    )]
+    Companion {
+        /// The file.
+        path: PathBuf,
+        /// Where it should be.
+        to: PathBuf,
+        /// Why not.
+        problem: String,
+    },
     /// A result is no mesh.
     #[error("the result of scan `{name}` cannot be kept: {error}")]
     Result {
@@ -104,6 +119,7 @@ impl Package<'_> {
         spare_inputs(folder, self.subjects, self.inputs, &self.outputs)?;
         let scans = (0..self.subjects.len()).into_par_iter().map(|at| self.write_scan(folder, at));
         let scans = scans.collect::<Result<Vec<_>, PackageError>>()?;
+        self.copy_companions(folder)?;
         let Registration { template, .. } = self.registration;
         let frozen = FrozenCollection { template: template.clone(), settings: self.settings.clone() };
         write_whole(folder.join(TEMPLATE), &frozen.glb_bytes()?)?;
@@ -145,6 +161,27 @@ impl Package<'_> {
         Ok((result.report, entry, row))
     }
 
+    /// Copies what results in the template's own format name to where they look for it; what is there already stays.
+    fn copy_companions(&self, folder: &Path) -> Result<(), PackageError> {
+        for (name, path) in self.outputs.companions() {
+            let to = folder.join(&name);
+            let failed =
+                |problem: String| PackageError::Companion { path: path.clone(), to: to.clone(), problem };
+            if is_same(&path, &to) {
+                continue;
+            }
+            let results = self.subjects.iter().flat_map(|subject| self.outputs.files(&subject.name));
+            let results = results.map(|(_, file)| file).chain(OWN.map(str::to_owned));
+            if results.map(PathBuf::from).any(|file| file == name) {
+                return Err(failed("a result has that name: rename it, and in the template".to_owned()));
+            }
+            let made = to.parent().map_or(Ok(()), fs::create_dir_all);
+            let bytes = made.and_then(|()| fs::read(&path)).map_err(|error| failed(error.to_string()))?;
+            write_whole(&to, &bytes)?;
+        }
+        Ok(())
+    }
+
     fn seconds(&self, writing: f64) -> BTreeMap<String, f64> {
         let stages = self.registration.seconds.iter().map(|(stage, &seconds)| (stage.to_string(), seconds));
         let around = [("read", self.reading), ("write", writing)];
@@ -164,14 +201,22 @@ pub fn spare_inputs(
     outputs: &Outputs,
 ) -> Result<(), PackageError> {
     let template = outputs.source.map_or(&[][..], |source| &source.inputs);
+    let copied = outputs.companions();
     let outputs = subjects.iter().flat_map(|subject| outputs.files(&subject.name)).map(|(_, file)| file);
-    let outputs = outputs.chain([MANIFEST, REPORT, SHEET, TEMPLATE].map(str::to_owned));
-    let outputs: Vec<PathBuf> = outputs.filter_map(|name| fs::canonicalize(folder.join(name)).ok()).collect();
+    let outputs = outputs.chain(OWN.map(str::to_owned)).map(|name| folder.join(name));
+    let copies = copied.iter().map(|(name, path)| (folder.join(name), path));
+    let copies = copies.filter(|(to, path)| !is_same(path, to)).map(|(to, _)| to);
+    let outputs: Vec<PathBuf> =
+        outputs.chain(copies).filter_map(|path| fs::canonicalize(path).ok()).collect();
     let is_output = |input: &&InputFile| fs::canonicalize(&input.path).is_ok_and(|at| outputs.contains(&at));
     match inputs.iter().flatten().chain(template).find(is_output) {
         Some(input) => Err(PackageError::Overwrites { path: input.path.clone() }),
         None => Ok(()),
     }
+}
+
+fn is_same(one: &Path, other: &Path) -> bool {
+    matches!((fs::canonicalize(one), fs::canonicalize(other)), (Ok(one), Ok(other)) if one == other)
 }
 
 /// The program and its version, as records state it.

@@ -7,6 +7,8 @@ use std::time::Instant;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
+use super::landmark_weights::LandmarkWeights;
+use super::mask::check_mask;
 use super::observer::{Observer, Stage};
 use super::register::{RegisterError, Registration, Subject};
 use super::settings::Settings;
@@ -83,7 +85,7 @@ impl Plan {
     /// The plan for so many scans, from a template.
     ///
     /// # Errors
-    /// [`RegisterError::Empty`].
+    /// [`RegisterError::Empty`], [`RegisterError::TemplateMask`].
     pub fn from_template(
         template: &Template,
         scans: usize,
@@ -92,7 +94,18 @@ impl Plan {
         if scans == 0 {
             return Err(RegisterError::Empty);
         }
+        let mask = template.mask.as_ref().map_or(Ok(()), |mask| check_mask(mask, template.positions.len()));
+        mask.map_err(RegisterError::TemplateMask)?;
         Ok(Self::Template(TemplateCourse::new(template, scans, settings)))
+    }
+
+    /// The same with landmarks that count more or less.
+    pub fn weighing(mut self, landmarks: LandmarkWeights) -> Self {
+        match &mut self {
+            Self::Sphere(course) => course.weights = landmarks,
+            Self::Template(course) => course.weights = landmarks,
+        }
+        self
     }
 
     /// What is done, in this order.

@@ -5,9 +5,11 @@ use std::collections::BTreeMap;
 use glam::{DVec3, Vec3A};
 
 use super::fit::fit;
+use super::landmark_weights::LandmarkWeights;
 use super::mask::{MaskError, check_mask};
 use super::observer::{Canceled, Observer, Stage, Watch};
 use super::plan::Plan;
+use super::precheck::audit_landmarks;
 use super::scan_surface::ScanSurface;
 use super::settings::{FitSettings, Settings};
 use super::sphere::Sphere;
@@ -84,6 +86,9 @@ pub enum RegisterError {
         /// What is wrong with it.
         error: MaskError,
     },
+    /// A mask of the template that is none.
+    #[error("the template's mask {0}")]
+    TemplateMask(MaskError),
     /// Intermediate results of another plan or version.
     #[error("an intermediate result is not what the step needs: register the scans again")]
     State,
@@ -123,7 +128,8 @@ pub fn register(
     observer: &dyn Observer,
 ) -> Result<Registration, RegisterError> {
     let landmarks: Vec<&LandmarkSet> = subjects.iter().map(|subject| &subject.landmarks).collect();
-    Plan::new(&landmarks, settings)?.run(subjects, observer)
+    let weights = LandmarkWeights::of(|| audit_landmarks(subjects), settings);
+    Plan::new(&landmarks, settings)?.weighing(weights).run(subjects, observer)
 }
 
 /// Registers every scan from the template, by the landmarks that it has in common with the template.
@@ -143,7 +149,8 @@ pub fn register_to(
     settings: &Settings,
     observer: &dyn Observer,
 ) -> Result<Registration, RegisterError> {
-    Plan::from_template(template, subjects.len(), settings)?.run(subjects, observer)
+    let weights = LandmarkWeights::of(|| audit_landmarks(subjects), settings);
+    Plan::from_template(template, subjects.len(), settings)?.weighing(weights).run(subjects, observer)
 }
 
 impl Subject {

@@ -1,7 +1,9 @@
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 use serde::Serialize;
 
+use super::carried::matched_triangles;
 use super::membership::FailedScan;
 use super::package::program;
 use super::precheck::Precheck;
@@ -12,7 +14,7 @@ use crate::evaluate::Fidelity;
 use crate::mesh::{SurfacePoint, TriangleMesh};
 
 /// Version of this record.
-const RECORD: u32 = 1;
+const RECORD: u32 = 2;
 
 /// How well a registration went; but for the seconds, the same inputs and settings give the same report.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -41,7 +43,8 @@ pub struct ScanReport {
     /// What was known before.
     #[serde(flatten)]
     pub precheck: Precheck,
-    /// Distances, normals and the state of the triangles.
+    /// Distances, normals and the state of the triangles, of what is matched: without the template's carried and masked
+    /// parts, against the scan without what its mask leaves out.
     #[serde(flatten)]
     pub fidelity: Fidelity,
     /// Share of the result's area that the scan's data says: where the vertices' confidence is above a half.
@@ -66,13 +69,14 @@ impl ScanReport {
             Some((name.clone(), position(result, at).distance(target)))
         };
         let landmarks: BTreeMap<String, f64> = template.landmarks.iter().filter_map(residual).collect();
+        let matched = only(result, matched_triangles(template));
         let mut report = Self {
             name: subject.name.clone(),
             verdict: Verdict::Pass,
             reasons: Vec::new(),
             precheck: precheck.clone(),
-            fidelity: Fidelity::of(&subject.mesh, result),
-            coverage: coverage(result, confidence),
+            fidelity: Fidelity::of(&data(subject), &matched),
+            coverage: coverage(&matched, confidence),
             landmark_mean: landmarks.values().sum::<f64>() / landmarks.len().max(1) as f64,
             landmarks,
         };
@@ -94,6 +98,22 @@ impl Report {
     pub fn count(&self, verdict: Verdict) -> usize {
         self.scans.iter().filter(|scan| scan.verdict == verdict).count()
     }
+}
+
+/// A mesh of some of its triangles and all its vertices; all of it if these are no mesh.
+fn only(mesh: &TriangleMesh, triangles: Vec<[u32; 3]>) -> Cow<'_, TriangleMesh> {
+    if triangles.len() == mesh.triangles().len() {
+        return Cow::Borrowed(mesh);
+    }
+    let part = TriangleMesh::new(mesh.positions().to_vec(), triangles);
+    part.map_or(Cow::Borrowed(mesh), Cow::Owned)
+}
+
+/// A scan without what its mask leaves out.
+fn data(subject: &Subject) -> Cow<'_, TriangleMesh> {
+    let counts = |i: u32| subject.mask.as_ref().is_none_or(|mask| mask[i as usize] > 0.0);
+    let counted = |corners: &&[u32; 3]| corners.iter().all(|&i| counts(i));
+    only(&subject.mesh, subject.mesh.triangles().iter().filter(counted).copied().collect())
 }
 
 /// The share of a mesh's area around vertices of a confidence above a half.

@@ -32,6 +32,9 @@ pub struct Settings {
     /// sphere is left out; a scan alone is registered to it. It has vertices for `vertices` up to 10242.
     #[serde(default)]
     pub from_head: bool,
+    /// Landmarks that the audit doubts count less, and not at all where it finds them misplaced. Off, all count alike.
+    #[serde(default)]
+    pub audit_weights: bool,
     /// The groupwise stage; zero rounds leave it out.
     pub groupwise: GroupwiseSettings,
     /// Registration from a given template. After each of its rounds but the last the mean takes the template's place,

@@ -14,6 +14,8 @@ use super::groupwise::{
 };
 use super::head::{self, head};
 use super::known::{known, unknown};
+use super::landmark_weights::LandmarkWeights;
+use super::laying::laid;
 use super::observer::{Observer, Stage, Watch};
 use super::plan::PlanStage;
 use super::register::{LEAST_LANDMARKS, RegisterError, SAMPLES, Subject, moved_onto, trust};
@@ -44,6 +46,8 @@ pub struct SphereCourse {
     scheme: Option<String>,
     /// The head takes the place of fit, resample and register.
     from_head: bool,
+    /// How much each landmark counts.
+    pub(super) weights: LandmarkWeights,
 }
 
 /// A scan in unit space, turned as the collection's first one, with its landmarks.
@@ -51,6 +55,8 @@ pub struct Aligned {
     name: String,
     pub(super) scan: ScanSurface,
     landmarks: Vec<Vec3A>,
+    /// How much each of them counts.
+    weights: Vec<f64>,
 }
 
 fn last_level(settings: &FitSettings) -> u32 {
@@ -67,7 +73,7 @@ impl SphereCourse {
             && last_level(&settings.register) <= HEAD_LEVEL
             && head::has_landmarks(&names, scheme.as_deref());
         let (settings, first) = (settings.clone(), first.unwrap_or_default());
-        Ok(Self { settings, names, first, scheme, from_head })
+        Ok(Self { settings, names, first, scheme, from_head, weights: LandmarkWeights::default() })
     }
 
     /// A scan alone is registered to the head itself, where that has the vertices that are asked for.
@@ -85,10 +91,11 @@ impl SphereCourse {
 
     pub(super) fn prepare(&self, subject: &Subject) -> Aligned {
         let own: Vec<DVec3> = self.names.iter().filter_map(|name| subject.landmarks.get(name)).collect();
-        let rotation = Similarity::between(&own, &self.first, &vec![1.0; own.len()]).rotation;
+        let weights = self.weights.on(&subject.name, &self.names);
+        let rotation = Similarity::between(&own, &self.first, &weights).rotation;
         let scan = ScanSurface::weighted(&subject.mesh, subject.mask.as_deref(), rotation, SAMPLES);
         let landmarks = own.iter().map(|&p| scan.to_unit(p)).collect();
-        Aligned { name: subject.name.clone(), scan, landmarks }
+        Aligned { name: subject.name.clone(), scan, landmarks, weights }
     }
 
     pub(super) fn scan_step(
@@ -168,8 +175,8 @@ impl SphereCourse {
         observer: &dyn Observer,
     ) -> Result<ScanState, RegisterError> {
         let settings = &self.settings.register;
-        let landmarks: Vec<SphereLandmark> = zip(on_sphere, &scan.landmarks)
-            .map(|(&on_sphere, &target)| SphereLandmark { on_sphere, target })
+        let landmarks: Vec<SphereLandmark> = zip(on_sphere, zip(&scan.landmarks, &scan.weights))
+            .map(|(&on_sphere, (&target, &weight))| SphereLandmark { on_sphere, target, weight })
             .collect();
         let shape = fit(&scan.scan, settings, &landmarks, &watch(observer, Stage::Register, scan, settings))?;
         Ok(self.after(0, scan, shape))
@@ -187,8 +194,8 @@ impl SphereCourse {
             })
             .collect();
         let targets: Vec<DVec3> = scan.landmarks.iter().map(|p| p.as_dvec3()).collect();
-        let similarity = Similarity::between(&on_head, &targets, &vec![1.0; on_head.len()]);
-        head.iter().map(|p| similarity.apply(p.as_dvec3()).as_vec3a()).collect()
+        let head: Vec<DVec3> = head.iter().map(|p| p.as_dvec3()).collect();
+        laid(&head, &on_head, &targets, &scan.weights)
     }
 
     fn head_mesh(&self) -> SharedMesh {
@@ -292,7 +299,7 @@ impl SphereCourse {
         let watch = Watch { observer, stage: Stage::Groupwise, scan: &scan.name, iterations };
         let rest = RestShape::new(sphere.connectivity.clone(), mean.positions.clone());
         let start = moved_onto(&rest.positions, &shape, &own.known);
-        let pulls = pulls(&mean.points, &scan.landmarks);
+        let pulls = pulls(&mean.points, scan);
         let member = Member { scan: &scan.scan, landmarks: &pulls, start };
         let shape = register_member(&rest, member, settings, &watch, round * per_round)?;
         Ok(self.after(round + 1, scan, shape))
@@ -309,8 +316,12 @@ fn watch<'a>(
     Watch { observer, stage, scan: &scan.name, iterations }
 }
 
-fn pulls(points: &[SurfacePoint], targets: &[Vec3A]) -> Vec<LandmarkPull> {
-    zip(points, targets).map(|(point, &target)| LandmarkPull::new(point, target)).collect()
+fn pulls(points: &[SurfacePoint], scan: &Aligned) -> Vec<LandmarkPull> {
+    let pull = |(point, (&target, &weight))| LandmarkPull {
+        weight: weight as f32,
+        ..LandmarkPull::new(point, target)
+    };
+    zip(points, zip(&scan.landmarks, &scan.weights)).map(pull).collect()
 }
 
 /// What the scans bring to a mean.

@@ -20,6 +20,8 @@ pub struct Template {
     pub scheme: Option<String>,
     /// Texture coordinates `[N, 2]`, where each vertex has one.
     pub texture_coordinates: Option<Vec<DVec2>>,
+    /// How much each vertex takes of the scans' data `[N]`, 0 to 1; without it all do.
+    pub mask: Option<Vec<f32>>,
     /// It is that of a finished collection and stays as it is, whatever is registered from it.
     pub frozen: bool,
 }
@@ -45,6 +47,7 @@ impl Template {
             landmarks: landmarks.present().map(place).collect(),
             scheme: landmarks.scheme.clone(),
             texture_coordinates: file.vertex_texture_coordinates(),
+            mask: None,
             frozen: false,
         }
     }
@@ -64,6 +67,7 @@ impl Template {
             texture_coordinates: Some(layout(sphere, &landmarks, scheme)),
             landmarks,
             scheme: scheme.map(str::to_owned),
+            mask: None,
             frozen: false,
         }
     }

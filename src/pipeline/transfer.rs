@@ -10,6 +10,8 @@ use super::confidence::confidence;
 use super::connectivity::Connectivity;
 use super::groupwise::{Member, RestShape, mean_shape, register_member};
 use super::known::known;
+use super::landmark_weights::LandmarkWeights;
+use super::laying::laid;
 use super::observer::{Observer, Stage, Watch};
 use super::plan::PlanStage;
 use super::register::{LEAST_LANDMARKS, RegisterError, SAMPLES, Subject, moved_onto};
@@ -30,6 +32,8 @@ pub struct TemplateCourse {
     template: Template,
     /// How often scans are registered; each time but the first from the mean of the time before.
     rounds: usize,
+    /// How much each landmark counts.
+    pub(super) weights: LandmarkWeights,
     #[serde(skip)]
     matched: OnceLock<Arc<Matched>>,
 }
@@ -59,7 +63,8 @@ impl TemplateCourse {
     pub(super) fn new(template: &Template, scans: usize, settings: &Settings) -> Self {
         let rounds = if template.frozen || scans == 1 { 1 } else { settings.transfer.rounds.max(1) };
         let (settings, template) = (settings.clone(), template.clone());
-        Self { settings, template, rounds, matched: OnceLock::new() }
+        let weights = LandmarkWeights::default();
+        Self { settings, template, rounds, weights, matched: OnceLock::new() }
     }
 
     pub(super) fn stages(&self) -> Vec<PlanStage> {
@@ -77,7 +82,7 @@ impl TemplateCourse {
     }
 
     pub(super) fn prepare(&self, subject: &Subject) -> Result<Laid, RegisterError> {
-        Laid::of(&self.matched().parts.main, subject)
+        Laid::of(&self.matched().parts.main, subject, &self.weights)
     }
 
     pub(super) fn scan_step(
@@ -99,7 +104,9 @@ impl TemplateCourse {
         let per_round = settings.phases * settings.iterations;
         let iterations = per_round * self.rounds;
         let watch = Watch { observer, stage: Stage::Register, scan: &scan.name, iterations };
-        let rest = RestShape::new(self.matched().connectivity.clone(), start.clone());
+        let Matched { parts, connectivity } = self.matched();
+        let mask = parts.main.mask.as_deref();
+        let rest = RestShape::new(connectivity.clone(), start.clone()).masked(mask);
         let member = Member { scan: &scan.scan, landmarks: &scan.pulls, start };
         let shape = register_member(&rest, member, settings, &watch, round * per_round)?;
         Ok(self.after(round + 1, &scan.scan, shape))
@@ -112,7 +119,10 @@ impl TemplateCourse {
             let known = known(connectivity, scan, &shape);
             return ScanState::Shaped(Contribution { shape, known, weight: 1.0, need: Vec::new() });
         }
-        let confidence = confidence(scan, &connectivity.topology, &shape);
+        let mut confidence = confidence(scan, &connectivity.topology, &shape);
+        for (confidence, taken) in confidence.iter_mut().zip(parts.main.mask.iter().flatten()) {
+            *confidence *= taken;
+        }
         let main: Vec<DVec3> = shape.into_iter().map(|p| scan.to_scan(p)).collect();
         ScanState::Placed(Placed { positions: parts.carry(&main), confidence: parts.confidence(&confidence) })
     }
@@ -145,29 +155,40 @@ impl TemplateCourse {
 }
 
 impl Laid {
-    fn of(template: &Template, subject: &Subject) -> Result<Self, RegisterError> {
+    /// Lays the template on a scan by the landmarks that both have, which count as `weights` says of their names.
+    fn of(template: &Template, subject: &Subject, weights: &LandmarkWeights) -> Result<Self, RegisterError> {
         let common = common_landmarks(template, subject)?;
-        let (own, theirs): (Vec<DVec3>, Vec<DVec3>) =
-            common.iter().map(|(at, target)| (template.point(&template.positions, at), *target)).unzip();
-        let equal = vec![1.0; common.len()];
-        let rotation = Similarity::between(&theirs, &own, &equal).rotation;
+        let names: Vec<&str> = common.iter().map(|common| common.name).collect();
+        let weights = weights.on(&subject.name, &names);
+        let own: Vec<DVec3> =
+            common.iter().map(|common| template.point(&template.positions, common.at)).collect();
+        let theirs: Vec<DVec3> = common.iter().map(|common| common.target).collect();
+        let rotation = Similarity::between(&theirs, &own, &weights).rotation;
         let scan = ScanSurface::weighted(&subject.mesh, subject.mask.as_deref(), rotation, SAMPLES);
         let targets: Vec<DVec3> = theirs.iter().map(|&p| scan.to_unit(p).as_dvec3()).collect();
-        let laid = Similarity::between(&own, &targets, &equal);
-        let start = template.positions.iter().map(|&p| laid.apply(p).as_vec3a()).collect();
-        let pull =
-            |((at, _), target): (&(&SurfacePoint, DVec3), &DVec3)| LandmarkPull::new(at, target.as_vec3a());
-        let pulls = common.iter().zip(&targets).map(pull).collect();
+        let start = laid(&template.positions, &own, &targets, &weights);
+        let pull = |((common, target), &weight): ((&Common, &DVec3), &f64)| LandmarkPull {
+            weight: weight as f32,
+            ..LandmarkPull::new(common.at, target.as_vec3a())
+        };
+        let pulls = common.iter().zip(&targets).zip(&weights).map(pull).collect();
         Ok(Self { name: subject.name.clone(), scan, pulls, start })
     }
 }
 
-/// Where each landmark that both have lies on the template and on the scan.
-fn common_landmarks<'a>(
-    template: &'a Template,
-    subject: &Subject,
-) -> Result<Vec<(&'a SurfacePoint, DVec3)>, RegisterError> {
-    let on_both = |(name, at): (&String, &'a SurfacePoint)| Some((at, subject.landmarks.get(name)?));
+/// A landmark that template and scan have.
+struct Common<'t> {
+    name: &'t str,
+    /// Its place on the template.
+    at: &'t SurfacePoint,
+    /// Its position on the scan, in the scan's space.
+    target: DVec3,
+}
+
+fn common_landmarks<'t>(template: &'t Template, subject: &Subject) -> Result<Vec<Common<'t>>, RegisterError> {
+    let on_both = |(name, at): (&'t String, &'t SurfacePoint)| {
+        Some(Common { name, at, target: subject.landmarks.get(name)? })
+    };
     let common: Vec<_> = template.landmarks.iter().filter_map(on_both).collect();
     if common.len() < LEAST_LANDMARKS {
         return Err(RegisterError::TooFewForTemplate { scan: subject.name.clone(), found: common.len() });

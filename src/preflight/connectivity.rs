@@ -2,7 +2,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use crate::mesh::TriangleMesh;
+use crate::mesh::{TriangleMesh, components};
 
 /// How a surface's triangles hang together.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -58,11 +58,7 @@ impl Connectivity {
         let triangles = mesh.triangles();
         let sides = sorted_sides(triangles);
         let mut found = Self::default();
-        let (mut vertices, mut corners) = (Sets::new(mesh.positions().len()), Sets::new(3 * triangles.len()));
-        for [a, b, c] in triangles {
-            vertices.join(*a, *b);
-            vertices.join(*a, *c);
-        }
+        let mut corners = Sets::new(3 * triangles.len());
         let mut rim = Vec::new();
         for group in sides.chunk_by(|one, next| one.edge == next.edge) {
             match group {
@@ -72,7 +68,7 @@ impl Connectivity {
             }
         }
         found.count_vertices(triangles, &mut corners, mesh.positions().len());
-        let part_of: Vec<u32> = (0..mesh.positions().len() as u32).map(|v| vertices.of(v)).collect();
+        let part_of = components(mesh.positions().len(), triangles);
         let largest = found.add_components(mesh, &part_of);
         found.add_loops(mesh, &rim, |v| part_of[v as usize] == largest);
         found

@@ -18,8 +18,11 @@ const HAND: f64 = 0.012;
 /// The smallest variance of a coordinate, where all faces are the same.
 const LEAST_VARIANCE: f64 = 1e-8;
 
-/// The upper quartile of the strangeness of landmarks that are as loose as others, in units of the median.
-const QUARTILE: f64 = 1.35;
+/// The share of faces on which a landmark is no stranger than its looseness allows for. Tips of noses stray seldom and
+/// then far, which the upper quartile of a dozen faces hides; beyond this a single mistake would count.
+const LOOSE_ON: f64 = 0.85;
+/// That quantile of the strangeness of landmarks that are as loose as others, in units of the median.
+const USUAL_QUANTILE: f64 = 1.55;
 /// The median strangeness of a face exactly like the mean is no measure: at least this.
 const LEAST_USUAL: f64 = 0.5;
 
@@ -78,7 +81,7 @@ impl FaceModel {
         filled
     }
 
-    /// How strange each landmark looks on a quarter of the faces at least, in units of what is usual on each face.
+    /// How strange each landmark looks on a seventh of the faces at least, in units of what is usual on each face.
     ///
     /// A tip of a nose departs from what its neighbours say by more than they do from each other.
     fn looseness_on(&self, faces: &[Vec<DVec3>]) -> Vec<f64> {
@@ -95,7 +98,7 @@ impl FaceModel {
                 .zip(&strangeness)
                 .for_each(|(all, strangeness)| all.push(strangeness / usual));
         }
-        relative.into_iter().map(|all| (quantile(all, 0.75) / QUARTILE).max(1.0)).collect()
+        relative.into_iter().map(|all| (quantile(all, LOOSE_ON) / USUAL_QUANTILE).max(1.0)).collect()
     }
 
     /// The face's landmarks that are there, each to be held against the others; `None` if there are none.

@@ -52,7 +52,7 @@ impl Trial {
         for kill in 0..self.kills {
             // Anywhere between the first step and about the last, spread by a fixed rule.
             let share = (kill as f64 * 0.618_034).fract();
-            std::thread::sleep(needed.mul_f64(0.05 + 1.2 * share / self.kills as f64));
+            std::thread::sleep(needed.mul_f64(0.05 + 3.0 * share / self.kills as f64));
             server.kill();
             server = Server::start(folder.path());
         }

@@ -111,7 +111,7 @@ async fn bodies_that_are_wrong_are_refused() {
     assert_eq!(problem("application/zip", "PK\x03\x04").await, (422, "unreadable-file".into()));
     assert_eq!(problem("model/obj", "").await, (422, "unreadable-file".into()));
     assert_eq!(problem("text/html", OBJ).await, (415, "unsupported-media-type".into()));
-    assert_eq!(problem("application/octet-stream", "???").await, (415, "unsupported-media-type".into()));
+    assert_eq!(problem("application/octet-stream", "???").await, (422, "unreadable-file".into()));
     assert_eq!(problem("model/obj", &"v 0 0 0\n".repeat(2000)).await, (413, "limit-exceeded".into()));
     assert_eq!(server.send(Request::post("/v1/scans"), OBJ).await.problem().0, 415);
     assert_eq!(server.post("/v1/scans?nme=x", "model/obj", OBJ).await.problem().0, 400);

@@ -7,6 +7,8 @@ use hyper::{Method, Request, StatusCode};
 use hyper_util::rt::TokioIo;
 use onemesh::http::Service;
 use onemesh::http::config::Config;
+use onemesh::job::Database;
+use onemesh::job::api_key::ApiKeys;
 use serde_json::Value;
 use tempfile::TempDir;
 use tokio::net::TcpStream;
@@ -14,6 +16,13 @@ use tokio::sync::oneshot;
 
 /// A tetrahedron as OBJ.
 pub const OBJ: &str = "v 0 0 0\nv 20 0 0\nv 0 20 0\nv 0 0 20\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
+
+/// The API keys of a server's folder, which need no server.
+pub async fn keys(folder: &std::path::Path) -> ApiKeys {
+    let data = folder.join("data");
+    std::fs::create_dir_all(&data).unwrap();
+    ApiKeys::new(Database::open(&data.join("onemesh.db")).await.unwrap())
+}
 
 /// A running server, which ends with this value.
 pub struct Server {

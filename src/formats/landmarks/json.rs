@@ -5,7 +5,7 @@ use serde::Deserialize;
 use serde::de::{MapAccess, Visitor};
 use serde_json::value::RawValue;
 
-use super::{LandmarkFile, Mark, slicer};
+use super::{LandmarkFile, Mark, parts, slicer};
 use crate::formats::error::Fault;
 use crate::formats::text::shown;
 
@@ -86,10 +86,39 @@ fn read_object(members: Members, depth: usize, file: &mut LandmarkFile) -> Resul
     match (inner, depth) {
         (None, _) => read_members(members, file),
         (Some(_), 0) => Err(Fault::at("the landmarks", "are wrapped in too many objects")),
-        (Some(inner), _) => match Members::of(inner) {
-            Some(members) => read_object(members, depth - 1, file),
-            None => read_list(inner, file),
-        },
+        (Some(inner), _) => {
+            match Members::of(inner) {
+                Some(members) => read_object(members, depth - 1, file),
+                None => read_list(inner, file),
+            }?;
+            name_by_parts(labels(&members), file);
+            Ok(())
+        }
+    }
+}
+
+#[derive(Deserialize)]
+struct Label {
+    label: String,
+    mask: Vec<usize>,
+}
+
+/// The parts that LJSON of version 2 and 3 marks in its list; other programs' labels are theirs.
+fn labels(members: &Members) -> Vec<(String, Vec<usize>)> {
+    let labels: Option<Vec<Label>> =
+        members.get("labels").and_then(|labels| serde_json::from_str(labels.get()).ok());
+    labels.unwrap_or_default().into_iter().map(|Label { label, mask }| (label, mask)).collect()
+}
+
+/// Names a list by the parts of the face, where these are iBUG's and the file says nothing else.
+fn name_by_parts(parts: Vec<(String, Vec<usize>)>, file: &mut LandmarkFile) {
+    if file.scheme.is_some() || !file.listed {
+        return;
+    }
+    if let Some(names) = parts::names(&parts, file.names.len()) {
+        file.scheme = Some(parts::SCHEME.to_owned());
+        file.names = names;
+        file.listed = false;
     }
 }
 
@@ -112,6 +141,7 @@ fn only_group(groups: &RawValue) -> Result<&RawValue, Fault> {
 
 #[derive(Deserialize)]
 struct Group<'a> {
+    label: Option<String>,
     #[serde(borrow)]
     landmarks: Vec<GroupPoint<'a>>,
 }
@@ -126,14 +156,18 @@ struct GroupPoint<'a> {
 fn read_groups(groups: &RawValue, file: &mut LandmarkFile) -> Result<(), Fault> {
     let groups: Vec<&RawValue> =
         serde_json::from_str(groups.get()).map_err(|error| Fault::at("groups", error.to_string()))?;
+    let mut parts = Vec::new();
     for (at, group) in groups.into_iter().enumerate() {
         let group: Group = serde_json::from_str(group.get())
             .map_err(|error| Fault::at(format_args!("groups[{at}]"), error.to_string()))?;
+        let first = file.names.len();
         for point in group.landmarks {
             push_entry(point.point, file)?;
         }
+        parts.push((group.label.unwrap_or_default(), (first..file.names.len()).collect()));
     }
     file.listed = true;
+    name_by_parts(parts, file);
     Ok(())
 }
 

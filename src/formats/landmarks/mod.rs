@@ -2,6 +2,7 @@
 
 mod json;
 mod meshlab;
+mod parts;
 mod resolve;
 mod slicer;
 #[cfg(test)]
@@ -66,7 +67,8 @@ impl LandmarkFile {
     ///   missing.
     /// - JSON by Wrap, `[[triangle, u, v], ...]` or `{"name": [triangle, u, v], ...}`: u of the triangle's first corner,
     ///   v of its second, the rest of its third. Polygons count as many triangles as they are cut into.
-    /// - Menpo's LJSON, version 1, 2 or 3.
+    /// - Menpo's LJSON, version 1, 2 or 3. Where its labels are those of iBUG's parts of the face, the landmarks are the
+    ///   68 of Multi-PIE, in whatever order the parts come.
     /// - 3D Slicer's markups (`.mrk.json`): control points by their labels.
     /// - MeshLab's picked points (`.pp`): inactive ones are missing.
     /// - Text: one vertex a line, counted from 0 in the mesh's file, or `null`; `#` begins a comment.

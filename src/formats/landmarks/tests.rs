@@ -75,6 +75,65 @@ fn what_is_written_is_read_back() {
     }
 }
 
+/// The parts of iBUG's 68 landmarks as another program orders and calls them, and their numbers in the scheme.
+const PARTS: [(&str, std::ops::Range<usize>); 7] = [
+    ("chin", 0..17),
+    ("leye", 36..42),
+    ("reye", 42..48),
+    ("leyebrow", 17..22),
+    ("nose", 27..36),
+    ("reyebrow", 22..27),
+    ("mouth", 48..68),
+];
+
+/// A landmark of the scheme, at its number.
+fn numbered(number: usize) -> serde_json::Value {
+    if number == 30 { serde_json::json!([null, null, null]) } else { serde_json::json!([number, 0, 0]) }
+}
+
+fn has_each_number_at_its_place(text: &str) {
+    let set = read(text);
+    assert_eq!(set.scheme.as_deref(), Some("multipie68"), "{text}");
+    assert_eq!(set.names.len(), 68);
+    for number in 0..68 {
+        let at = (number != 30).then(|| DVec3::X * number as f64);
+        assert_eq!(set.get(&number.to_string()), at, "{number}");
+    }
+}
+
+#[test]
+fn ljson_with_ibug_s_parts_is_multipie_in_whatever_order() {
+    use serde_json::json;
+    let points: Vec<_> = PARTS.iter().flat_map(|(_, numbers)| numbers.clone()).map(numbered).collect();
+    let mut passed = 0;
+    let mut labels = vec![json!({ "label": "all", "mask": (0..68).collect::<Vec<_>>() })];
+    for (label, numbers) in PARTS {
+        labels.push(json!({ "label": label, "mask": (passed..passed + numbers.len()).collect::<Vec<_>>() }));
+        passed += numbers.len();
+    }
+    let body = json!({ "labels": labels, "landmarks": { "connectivity": [], "points": points } });
+    has_each_number_at_its_place(&json!({ "version": 3, "groups": { "LJSON": body } }).to_string());
+    let mut two = body.clone();
+    two["version"] = json!(2);
+    has_each_number_at_its_place(&two.to_string());
+    let group = |(label, numbers): (&str, std::ops::Range<usize>)| {
+        let landmarks: Vec<_> = numbers.map(|number| json!({ "point": numbered(number) })).collect();
+        json!({ "label": label, "connectivity": [], "landmarks": landmarks })
+    };
+    let one = json!({ "version": 1, "groups": PARTS.map(group) });
+    has_each_number_at_its_place(&one.to_string());
+
+    // A part that is not whole, one that is told twice and a place that is not there leave the list as it is.
+    for (part, mask) in
+        [(4, json!([23, 24])), (4, json!([24, 25, 26, 27, 28])), (1, json!((983..1000).collect::<Vec<_>>()))]
+    {
+        let mut other = two.clone();
+        other["labels"][part]["mask"] = mask;
+        let set = read(&other.to_string());
+        assert_eq!((set.scheme, set.names[17].as_str()), (None, "17"));
+    }
+}
+
 /// A unit square of two triangles, and a vertex that none of them names.
 const SQUARE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 9 9 9\nf 1 2 3 4\n";
 

@@ -1,4 +1,4 @@
-//! Masks: how much each vertex of a scan counts as data, from 0 (none) to 1.
+//! Masks: how much each vertex of a scan counts as data, or of a template takes of it, from 0 (none) to 1.
 
 mod json;
 mod painted;
@@ -109,7 +109,7 @@ impl MaskFile {
             Source::Painted(painted) => painted.on(mesh),
         }?;
         if weights.iter().all(|w| *w == 0.0) {
-            return Err(Fault::at("the mask", "leaves nothing of the scan: every vertex has weight 0").into());
+            return Err(Fault::at("the mask", "leaves nothing: every vertex has weight 0").into());
         }
         Ok(weights)
     }
@@ -150,8 +150,7 @@ fn in_spheres(
         let centre = match centre {
             Centre::Point(point) => *point,
             Centre::Landmark(name) => landmarks.get(name).ok_or_else(|| {
-                let problem =
-                    format!("`{name}` is not among the scan's landmarks: name one, or give a `centre`");
+                let problem = format!("`{name}` is not among the landmarks: name one, or give a `centre`");
                 Fault::at(format!("spheres, entry {k}, landmark"), problem)
             })?,
         };

@@ -78,6 +78,9 @@ async fn metrics(State(app): State<App>) -> Result<([(HeaderName, &'static str);
     for (status, count) in [("ready", figures.steps_ready), ("running", figures.steps_running)] {
         app.metrics.steps.get_or_create(&StatusLabels { status }).set(count.cast_signed());
     }
+    for (stage, (steps, seconds)) in figures.stages {
+        app.metrics.set_stage(stage, steps, seconds);
+    }
     app.metrics.free_bytes.set(app.folder.free_bytes()? as f64);
     Ok(([(CONTENT_TYPE, OPEN_METRICS)], app.metrics.text()))
 }

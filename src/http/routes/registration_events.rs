@@ -32,7 +32,7 @@ pub fn router() -> OpenApiRouter<App> {
     get, path = "/v1/registrations/{id}/events", operation_id = "get_registration_events", tag = "registrations",
     params(
         ("id" = String, Path, description = "The registration's id.", pattern = "^[0-9a-f]{32}$"),
-        ("Last-Event-ID" = Option<u64>, Header, description = "The id of the last event that the client has.", minimum = 0),
+        ("Last-Event-ID" = Option<u64>, Header, description = "The id of the last event that the client has.", minimum = 0, nullable = false),
     ),
     responses((status = 200, description = "Events, each as it happens.", body = EventView, content_type = "text/event-stream",
         example = "event: stage\nid: 3\ndata: {\"at\":\"2026-03-01T12:00:01Z\",\"event\":\"stage\",\"stage\":\"fit\"}\n\n")),

@@ -62,7 +62,7 @@ struct ListQuery {
 /// answer comes after up to N seconds, at most 60, and with status 200 if the registration has ended by then.
 #[utoipa::path(
     post, path = "/v1/registrations", operation_id = "create_registration", tag = "registrations",
-    params(("Prefer" = Option<String>, Header, description = "`wait=N` waits up to N seconds for the end.", example = "wait=10")),
+    params(("Prefer" = Option<String>, Header, description = "`wait=N` waits up to N seconds for the end.", example = "wait=10", nullable = false)),
     request_body = RegistrationRequest,
     responses(
         (status = 202, description = "It is kept and will be worked on.", body = RegistrationView, headers(("Location" = String, description = "Its path."))),
@@ -156,7 +156,7 @@ async fn delete(State(app): State<App>, Id(id): Id<RegistrationId>) -> Result<St
     post, path = "/v1/registrations/{id}/scans", operation_id = "add_scans", tag = "registrations",
     params(
         ("id" = String, Path, description = "The finished registration's id.", pattern = "^[0-9a-f]{32}$"),
-        ("Prefer" = Option<String>, Header, description = "`wait=N` waits up to N seconds for the end.", example = "wait=10"),
+        ("Prefer" = Option<String>, Header, description = "`wait=N` waits up to N seconds for the end.", example = "wait=10", nullable = false),
     ),
     request_body = AddedScans,
     responses(

@@ -11,7 +11,7 @@ use utoipa_axum::routes;
 
 use crate::http::app::App;
 use crate::http::extract::{Id, QueryOf};
-use crate::http::page::{Page, PageQuery};
+use crate::http::page::{LAST_PLACE, Page, PageQuery};
 use crate::http::problem::{Kind, Problem};
 use crate::http::upload::Upload;
 use crate::http::wire::Binary;
@@ -20,9 +20,6 @@ use crate::http::wire::scan::Name;
 use crate::http::wire::template::TemplateView;
 use crate::job::scan::Part;
 use crate::job::template::{NewTemplate, TemplateId};
-
-/// The built-in template's place in the list: the largest whole number that all of JSON's readers know.
-const BEFORE_ALL: i64 = (1 << 53) - 1;
 
 pub fn router() -> OpenApiRouter<App> {
     OpenApiRouter::new().routes(routes!(create, list)).routes(routes!(get, delete))
@@ -78,7 +75,7 @@ async fn list(
     State(app): State<App>,
     QueryOf(query): QueryOf<PageQuery>,
 ) -> Result<Json<Page<TemplateView>>, Problem> {
-    let first = query.after.is_none().then(|| (BEFORE_ALL, TemplateView::built_in()));
+    let first = query.after.is_none().then(|| (LAST_PLACE, TemplateView::built_in()));
     let templates = app.templates.list(query.limit + 1, query.after).await?;
     let uploaded = templates.into_iter().map(|template| (template.sequence, template.into()));
     Ok(Json(Page::of(query.limit, first.into_iter().chain(uploaded).collect())))

@@ -1,10 +1,12 @@
+use serde::Deserialize;
 use utoipa::ToSchema;
 
 use super::Binary;
 use super::scan::Name;
 
 /// A scan as a form.
-#[derive(ToSchema)]
+#[derive(Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
 #[allow(dead_code)]
 pub struct ScanForm {
     /// The mesh; its field's Content-Type, or the end of its file name, says what it is.
@@ -25,7 +27,8 @@ pub struct ScanForm {
 }
 
 /// A template as a form.
-#[derive(ToSchema)]
+#[derive(Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
 #[allow(dead_code)]
 pub struct TemplateForm {
     /// The mesh; its field's Content-Type, or the end of its file name, says what it is.

@@ -10,6 +10,6 @@ mod time;
 pub use time::rfc3339;
 
 /// The bytes of a file.
-#[derive(utoipa::ToSchema)]
+#[derive(serde::Deserialize, utoipa::ToSchema)]
 #[schema(value_type = String, format = Binary)]
 pub struct Binary(#[allow(dead_code)] Vec<u8>);

@@ -175,7 +175,7 @@ impl Scans {
                 Part::Mask => parts.mask = digest,
                 Part::Texture => parts.texture = digest,
                 // A scan is its mesh: another one is another scan.
-                Part::Mesh => return Ok(self.get(id).await?),
+                Part::Mesh => return self.get(id).await,
             }
             let report = self.report(&parts).await?;
             // Another part may have been set meanwhile, which the report then would not know.

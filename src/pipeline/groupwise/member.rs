@@ -1,10 +1,11 @@
 use std::sync::Arc;
 
-use glam::Vec3A;
+use glam::{Mat3A, Vec3A};
 use rayon::prelude::*;
 
 use super::RestShape;
 use super::film::fall;
+use super::unfold::unfold;
 use crate::energy::LandmarkPull;
 use crate::mesh::{Normals, interpolate};
 use crate::numeric::{SolveBuffer, SparseCholesky, SymmetricMatrix};
@@ -13,7 +14,7 @@ use crate::pipeline::{GroupwiseSettings, ScanSurface, SurfaceSample};
 use crate::spatial::{Hit, SurfaceIndex};
 
 /// The system is factored anew after this many iterations; in between it is a good preconditioner.
-const FACTOR_EVERY: usize = 5;
+const FACTOR_EVERY: usize = 4;
 
 /// Weight that keeps a vertex without data where it is.
 const INERTIA: f64 = 0.1;
@@ -33,6 +34,9 @@ const FALL_SMOOTHING: f64 = 16.0;
 
 /// Share of the phases after which films fall: while the shape is stiff enough to fall in one piece.
 const FALLING: f64 = 0.4;
+
+/// Distortion at which a match of a template with a rim counts a quarter (Geman and McClure's weight).
+const TORN: f32 = 0.6;
 
 /// One scan of the collection, and where its registration begins.
 pub struct Member<'a> {
@@ -63,7 +67,9 @@ pub fn register_member(
             watch.step(first_iteration + phase * settings.iterations + iteration + 1, distance)?;
         }
     }
-    Ok(registration.p)
+    let mut p = registration.p;
+    unfold(&rest.connectivity, registration.scan, registration.landmarks, &mut p);
+    Ok(p)
 }
 
 /// A parameter that changes by the same factor from phase to phase; evenly where an end is zero and there is no factor.
@@ -75,6 +81,8 @@ struct Registration<'a> {
     rest: &'a RestShape,
     scan: &'a ScanSurface,
     landmarks: &'a [LandmarkPull],
+    /// The rest shape has a rim.
+    ends: bool,
     settings: &'a GroupwiseSettings,
     phase: Phase,
     smoother: Option<Arc<SparseCholesky>>,
@@ -122,6 +130,7 @@ impl<'a> Registration<'a> {
             rest,
             scan: member.scan,
             landmarks: member.landmarks,
+            ends: topology.on_rim.contains(&true),
             settings,
             phase: Phase::default(),
             smoother: None,
@@ -168,15 +177,19 @@ impl<'a> Registration<'a> {
         let connectivity = &self.rest.connectivity;
         self.normals.update(&connectivity.topology, &self.p);
         self.index.refit(&self.p);
-        let vertices = self.match_vertices();
-        let samples = self.match_samples(&vertices);
+        let mut vertices = self.match_vertices();
+        let mut samples = self.match_samples(&vertices);
+        let gradients =
+            self.smoother.clone().map(|smoother| self.rest.gradients(&self.p, &smoother, &mut self.buffer));
+        if let (true, Some(gradients)) = (self.ends, &gradients) {
+            self.distrust_what_tears(gradients, &mut vertices, &mut samples);
+        }
         let falls = self.falls(&vertices);
         let mut force = vec![Vec3A::ZERO; self.p.len()];
         let distance = self.add_vertex_forces(&vertices, &falls, &mut force)
             + self.add_sample_forces(&samples, &mut force);
         self.add_landmark_forces(&mut force);
-        if let Some(smoother) = &self.smoother {
-            let gradients = self.rest.gradients(&self.p, smoother, &mut self.buffer);
+        if let Some(gradients) = gradients {
             self.rest.add_force(&self.p, &gradients, self.phase.stiffness as f32, &mut force);
         }
         let weights = self.data_weights(&vertices, &samples);
@@ -196,6 +209,25 @@ impl<'a> Registration<'a> {
         distance
     }
 
+    /// Weakens matches where the template is torn apart. The scan goes on where a template ends, behind its ears for
+    /// instance, and there what lies nearest is not what belongs together.
+    fn distrust_what_tears(
+        &self,
+        gradients: &[Mat3A],
+        vertices: &mut [Option<VertexHit>],
+        samples: &mut [Option<SampleHit>],
+    ) {
+        let trust = |distortion: f32| (1.0 + (distortion / TORN).powi(2)).powi(-2);
+        let trust: Vec<f32> = self.rest.distortion(&self.p, gradients).into_iter().map(trust).collect();
+        for (found, trust) in vertices.iter_mut().zip(&trust) {
+            found.iter_mut().for_each(|found| found.weight *= trust);
+        }
+        for found in samples.iter_mut().flatten() {
+            let corners = self.rest.connectivity.topology.triangles[found.hit.triangle as usize];
+            found.weight *= corners.iter().map(|&i| trust[i as usize]).fold(1.0, f32::min);
+        }
+    }
+
     /// How firmly data holds each vertex `[N]`.
     fn data_weights(&self, vertices: &[Option<VertexHit>], samples: &[Option<SampleHit>]) -> Vec<f32> {
         let mut weights: Vec<f32> = vertices.iter().map(|hit| INERTIA as f32 + weight_of(hit)).collect();
@@ -209,7 +241,7 @@ impl<'a> Registration<'a> {
     }
 
     fn match_vertices(&mut self) -> Vec<Option<VertexHit>> {
-        let (p, normals, scan) = (&self.p, &self.normals.vertices, self.scan);
+        let (p, normals, scan, rest) = (&self.p, &self.normals.vertices, self.scan, self.rest);
         let (search, reach) = (self.phase.normal_search, self.phase.reach);
         let least_cosine = self.phase.least_cosine;
         let closest = |(i, hint): (usize, &mut u32)| {
@@ -226,7 +258,7 @@ impl<'a> Registration<'a> {
             // What closes an open scan from within hangs between its walls, which are not for it.
             let (normal, difference) = (scan.normal_at(&hit), p[i] - hit.point);
             let within = difference.dot(normal) < -FAR && normals[i].dot(normal) < TURNED;
-            let weight = scan.weight_at(&hit);
+            let weight = scan.weight_at(&hit) * rest.takes(i);
             (!within && weight > 0.0).then_some(VertexHit { hit, weight })
         };
         self.hints.par_iter_mut().enumerate().with_min_len(128).map(closest).collect()
@@ -250,7 +282,7 @@ impl<'a> Registration<'a> {
     }
 
     fn match_samples(&mut self, vertices: &[Option<VertexHit>]) -> Vec<Option<SampleHit>> {
-        let (scan, index, settings) = (self.scan, &self.index, self.settings);
+        let (scan, rest, index, settings) = (self.scan, self.rest, &self.index, self.settings);
         let off: Vec<f32> =
             vertices.iter().map(|found| found.map_or(f32::MAX, |f| f.hit.distance_squared)).collect();
         let (triangles, rim) = (&self.rest.connectivity.topology.triangles, &self.rest.connectivity.rim);
@@ -282,7 +314,8 @@ impl<'a> Registration<'a> {
             let is_for = |hit: &Hit| sample.weight > 0.0 && !rim.contains(hit.triangle, hit.weights);
             let hit = hit.filter(|hit| is_for(hit) && free(&sample, hit))?;
             let weight = (FAR / hit.distance_squared.sqrt().max(FAR)).min(1.0) * per_sample * sample.weight;
-            Some(SampleHit { sample, hit, weight })
+            let weight = weight * rest.takes_at(hit.triangle, hit.weights);
+            (weight > 0.0).then_some(SampleHit { sample, hit, weight })
         };
         self.samples_taken += self.phase.samples;
         (0..self.phase.samples).into_par_iter().with_min_len(128).map(closest).collect()

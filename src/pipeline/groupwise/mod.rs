@@ -6,7 +6,7 @@
 //! deformation costs nothing, whatever its size.
 //!
 //! Cavities that only some members have, as open mouths, are closed by films in the mean; in the late phases these fall
-//! into the scans that have them (`film.rs`).
+//! into the scans that have them (`film.rs`). What is folded at the end is unfolded on its scan (`unfold.rs`).
 
 mod closure;
 mod film;
@@ -15,6 +15,7 @@ mod member;
 mod redistribution;
 mod rest_shape;
 mod shared_mesh;
+mod unfold;
 
 pub use closure::close_smoothly;
 pub use mean::mean_shape;

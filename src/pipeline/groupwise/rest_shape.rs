@@ -3,7 +3,7 @@ use std::sync::Arc;
 use glam::{Mat3A, Vec3A};
 use rayon::prelude::*;
 
-use crate::mesh::{Normals, Topology};
+use crate::mesh::{Normals, Topology, interpolate};
 use crate::numeric::{SolveBuffer, SparseCholesky, SymmetricMatrix};
 use crate::pipeline::Connectivity;
 
@@ -21,6 +21,8 @@ pub struct RestShape {
     /// Twice the area of each triangle `[F]`.
     areas: Vec<f32>,
     inverse_frames: Vec<Mat3A>,
+    /// How much each vertex takes of the scans' data `[N]`, 0 to 1; `None` where all do.
+    mask: Option<Vec<f32>>,
 }
 
 /// Two edges of a triangle and its normal, as long as its area's square root asks.
@@ -41,7 +43,24 @@ impl RestShape {
         let inverse_frames = (0..topology.triangles.len()).map(inverse).collect();
         let areas = Normals::new(topology, &positions).area_vectors.iter().map(|e| e.length()).collect();
         let weights = cotangent_weights(topology, &positions);
-        Self { connectivity, positions, weights, areas, inverse_frames }
+        Self { connectivity, positions, weights, areas, inverse_frames, mask: None }
+    }
+
+    /// The same whose vertices take as much of the scans' data as `mask` `[N]` says, 0 to 1.
+    pub fn masked(self, mask: Option<&[f32]>) -> Self {
+        let mask = mask.filter(|mask| mask.iter().any(|taken| *taken != 1.0));
+        Self { mask: mask.map(<[f32]>::to_vec), ..self }
+    }
+
+    /// How much a vertex takes of the scans' data.
+    pub fn takes(&self, vertex: usize) -> f32 {
+        self.mask.as_ref().map_or(1.0, |mask| mask[vertex])
+    }
+
+    /// How much a point of barycentric weights on a triangle does.
+    pub fn takes_at(&self, triangle: u32, weights: [f32; 3]) -> f32 {
+        let corners = self.connectivity.topology.triangles[triangle as usize];
+        self.mask.as_ref().map_or(1.0, |mask| interpolate(mask, corners, weights))
     }
 
     /// Deformation gradients per vertex `[N]` of positions p, diffused over the surface by `smoother`.
@@ -68,6 +87,22 @@ impl RestShape {
             }
         }
         gradients
+    }
+
+    /// How far the edges at each vertex are from what the gradients ask of them, in their lengths at rest, as a root
+    /// mean square `[N]`: small where the shape bends and stretches smoothly, large where it tears or folds.
+    pub fn distortion(&self, p: &[Vec3A], gradients: &[Mat3A]) -> Vec<f32> {
+        let mut sums = vec![(0.0, 0.0); p.len()];
+        for &[a, b] in &self.connectivity.topology.edges {
+            let (a, b) = (a as usize, b as usize);
+            let rest = self.positions[a] - self.positions[b];
+            let wanted = 0.5 * (gradients[a] * rest + gradients[b] * rest);
+            let off = (p[a] - p[b]).distance_squared(wanted) / rest.length_squared().max(f32::MIN_POSITIVE);
+            for i in [a, b] {
+                sums[i] = (sums[i].0 + off, sums[i].1 + 1.0);
+            }
+        }
+        sums.into_iter().map(|(sum, count)| (sum / f32::max(count, 1.0)).sqrt()).collect()
     }
 
     /// Adds -mu/2 dE_J/dp `[N, 3]` at positions p with frozen gradients `[N]`.
@@ -128,6 +163,24 @@ mod tests {
     fn smoother(sphere: &Sphere) -> SparseCholesky {
         let matrix = SymmetricMatrix::diffusion(&sphere.connectivity.topology, 5.0);
         SparseCholesky::new(&sphere.connectivity.topology, &matrix, sphere.connectivity.dissection()).unwrap()
+    }
+
+    #[test]
+    fn what_is_torn_out_is_distorted_and_what_bends_is_not() {
+        let sphere = Sphere::of_level(4);
+        let rest = RestShape::new(sphere.connectivity.clone(), sphere.rest.clone());
+        let mut p: Vec<Vec3A> = sphere.rest.iter().map(|m| *m * (1.0 + 0.2 * (5.0 * m.x).sin())).collect();
+        let torn = 100;
+        p[torn] *= 1.5;
+        let gradients = rest.gradients(&p, &smoother(&sphere), &mut SolveBuffer::default());
+        let distortion = rest.distortion(&p, &gradients);
+        let ring = sphere.connectivity.topology.neighbours.row(torn);
+        for (i, &distortion) in distortion.iter().enumerate() {
+            let near = i == torn || ring.contains(&(i as u32));
+            let far = ring.iter().all(|&j| sphere.rest[i].distance(sphere.rest[j as usize]) > 0.4);
+            assert!(i != torn || distortion > 2.0, "{distortion}");
+            assert!(near || !far || distortion < 0.4, "{i}: {distortion}");
+        }
     }
 
     #[test]
