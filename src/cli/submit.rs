@@ -48,11 +48,13 @@ impl Submit {
     /// Does it.
     pub fn run(self) -> anyhow::Result<()> {
         let parameters = self.asked()?;
+        let template = self.template.files()?;
         let (collection, refused) = Collection::open_usable(&self.collection)?;
         refused.iter().for_each(|refused| eprintln!("{}: left out: {}", refused.name, refused.error));
         spare_inputs(&self.output, collection.members())?;
         let client = self.server.reach()?;
-        let template = self.send_template(&client)?;
+        let template =
+            template.map(|(mesh, landmarks)| send_template(&client, &mesh, landmarks)).transpose()?;
         let scans = send_scans(&client, collection.members())?;
         ensure!(!scans.is_empty(), "{}: no scan is left to register", self.collection.display());
         let left_out = refused.len() + collection.members().len() - scans.len();
@@ -78,27 +80,26 @@ impl Submit {
         let parameters = difference(&document(&base)?, &document(&wanted)?);
         Ok(Asked { preset, vertices: Some(wanted.vertices), parameters, ..Asked::default() })
     }
+}
 
-    /// Sends a template of the user's, if there is one, and gives its id.
-    fn send_template(&self, client: &Client) -> anyhow::Result<Option<String>> {
-        let Some((path, landmarks)) = self.template.files()? else { return Ok(None) };
-        let (mesh, _) = MeshUpload::read(&path)?;
-        let landmarks = landmarks.map(|path| fs::read(&path).with_context(|| path.display().to_string()));
-        let landmarks = landmarks.transpose()?;
-        #[derive(Deserialize)]
-        struct Template {
-            id: String,
-        }
-        let template: Result<Template, _> = client.patience.persist(|| {
-            let mut form = Form::new().mesh(&mesh)?;
-            if let Some(landmarks) = &landmarks {
-                form = form.file("landmarks", landmarks);
-            }
-            let content_type = form.content_type();
-            json(client.post("/v1/templates", &[("content-type", &content_type)], form.into_body())?)
-        });
-        Ok(Some(template.with_context(|| path.display().to_string())?.id))
+/// Sends a template of the user's, and gives its id.
+fn send_template(client: &Client, path: &Path, landmarks: Option<PathBuf>) -> anyhow::Result<String> {
+    #[derive(Deserialize)]
+    struct Template {
+        id: String,
     }
+    let (mesh, _) = MeshUpload::read(path)?;
+    let landmarks = landmarks.map(|path| fs::read(&path).with_context(|| path.display().to_string()));
+    let landmarks = landmarks.transpose()?;
+    let template: Result<Template, _> = client.patience.persist(|| {
+        let mut form = Form::new().mesh(&mesh)?;
+        if let Some(landmarks) = &landmarks {
+            form = form.file("landmarks", landmarks);
+        }
+        let content_type = form.content_type();
+        json(client.post("/v1/templates", &[("content-type", &content_type)], form.into_body())?)
+    });
+    Ok(template.with_context(|| path.display().to_string())?.id)
 }
 
 /// Refuses an output folder in which results would take the place of scans.

@@ -49,13 +49,14 @@ impl TemplateFiles {
         })
     }
 
-    /// Its files, where one is given: the mesh, and its landmarks unless it is a frozen collection, which holds its own.
+    /// Its files for a server, where one is given: the mesh, and its landmarks unless it is a frozen collection, which
+    /// holds its own.
     pub fn files(&self) -> anyhow::Result<Option<(PathBuf, Option<PathBuf>)>> {
-        anyhow::ensure!(
-            self.template_mask.is_none(),
-            "--template-mask: a server takes no mask of a template: use `register`"
-        );
         let Some(path) = &self.template else { return Ok(None) };
+        ensure!(
+            self.template_mask.is_none(),
+            "--template-mask: servers take none; use `register`, or the template.frozen.glb of a collection with the mask"
+        );
         let frozen = self.read()?.settings.is_some();
         let landmarks = self.template_landmarks.clone().or_else(|| beside(path));
         Ok(Some((path.clone(), landmarks.filter(|_| !frozen))))
