@@ -40,11 +40,11 @@ impl Heads {
 
     /// The audit with one scan's landmarks replaced; with its surface or without.
     fn audited(&self, at: usize, landmarks: &LandmarkSet, surface: bool) -> LandmarkAudit {
-        let distances = landmark_distances(&self.meshes[at], landmarks);
+        let distances = surface.then(|| landmark_distances(&self.meshes[at], landmarks));
         let case = |i: usize| AuditCase {
             name: &self.names[i],
             landmarks: if i == at { landmarks } else { &self.landmarks[i] },
-            distances: (surface && i == at).then_some(&distances),
+            distances: distances.as_ref().filter(|_| i == at),
         };
         audit(&(0..self.names.len()).map(case).collect::<Vec<_>>())
     }
