@@ -44,7 +44,7 @@ pub struct Registration {
     pub template: Template,
     /// Vertex positions `[N, 3]` of each member, in its own space, in the order of the subjects.
     pub members: Vec<Vec<DVec3>>,
-    /// How far each vertex of each member is known from its scan's data `[M][N]`, from 0 to 1; see [`confidence`].
+    /// How far each vertex of each member is known from its scan's data `[M][N]`, from 0 to 1; see [`confidence`](super::confidence()).
     pub confidence: Vec<Vec<f32>>,
     /// Wall-clock seconds of each stage.
     pub seconds: BTreeMap<Stage, f64>,
