@@ -58,12 +58,21 @@ impl Connectivity {
 
     /// Adds `weight` b b^T to a matrix, for a point b of barycentric weights on a triangle.
     pub fn add_point(&self, matrix: &mut SymmetricMatrix, triangle: u32, weights: [f32; 3], weight: f64) {
+        self.add_products(matrix, triangle, |j, k| weight * f64::from(weights[j]) * f64::from(weights[k]));
+    }
+
+    /// Adds a symmetric matrix of three rows, given by its entries, to the rows and columns of a triangle's corners.
+    pub fn add_products(
+        &self,
+        matrix: &mut SymmetricMatrix,
+        triangle: u32,
+        entry: impl Fn(usize, usize) -> f64,
+    ) {
         let corners = self.topology.triangles[triangle as usize];
         let edges = self.triangle_edges[triangle as usize];
         for k in 0..3 {
-            let (own, next) = (f64::from(weights[k]), f64::from(weights[(k + 1) % 3]));
-            matrix.diagonal[corners[k] as usize] += weight * own * own;
-            matrix.edges[edges[k] as usize] += weight * own * next;
+            matrix.diagonal[corners[k] as usize] += entry(k, k);
+            matrix.edges[edges[k] as usize] += entry(k, (k + 1) % 3);
         }
     }
 }

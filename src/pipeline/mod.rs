@@ -59,7 +59,7 @@ pub use scan_result::ScanResult;
 pub use scan_surface::{ScanSurface, SurfaceSample};
 pub use settings::{
     Density, FitSettings, GroupwiseSettings, LevelSettings, Preset, Ramp, ResampleSettings, SettingError,
-    Settings,
+    Settings, SettleSettings,
 };
 pub use sphere::Sphere;
 pub use sphere_course::{Aligned, SphereCourse};

@@ -169,6 +169,21 @@ pub struct GroupwiseSettings {
     pub film_stretch: f32,
     /// Share of a match's pull along the scan's normal only: 1 lets the template slide freely.
     pub plane: f32,
+    /// How the shape settles on the scan at the end of a round.
+    #[serde(default)]
+    pub settle: SettleSettings,
+}
+
+/// The end of a round: triangles, not vertices, come to lie on the scan. Zeros, as files from before have it, do nothing.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SettleSettings {
+    /// How often all samples are matched anew.
+    pub iterations: usize,
+    /// The length l, in unit space, at which a distance counts as much as a normal turned by one radian.
+    pub normals: f32,
+    /// Stiffness mu of a step.
+    pub stiffness: f32,
 }
 
 /// A parameter that cannot be set.

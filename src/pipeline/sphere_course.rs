@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use super::confidence::confidence;
 use super::fit::{SphereLandmark, fit};
 use super::groupwise::{
-    Member, RestShape, SharedMesh, carried, close_smoothly, mean_shape, need, register_member,
+    Member, RestShape, SharedMesh, Turn, carried, close_smoothly, mean_shape, need, register_member,
 };
 use super::head::{self, head};
 use super::known::{known, unknown};
@@ -301,7 +301,8 @@ impl SphereCourse {
         let start = moved_onto(&rest.positions, &shape, &own.known);
         let pulls = pulls(&mean.points, scan);
         let member = Member { scan: &scan.scan, landmarks: &pulls, start };
-        let shape = register_member(&rest, member, settings, &watch, round * per_round)?;
+        let turn = Turn { done: round * per_round, last: round + 1 == settings.rounds };
+        let shape = register_member(&rest, member, settings, &watch, turn)?;
         Ok(self.after(round + 1, scan, shape))
     }
 }

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::carried::Parts;
 use super::confidence::confidence;
 use super::connectivity::Connectivity;
-use super::groupwise::{Member, RestShape, mean_shape, register_member};
+use super::groupwise::{Member, RestShape, Turn, mean_shape, register_member};
 use super::known::known;
 use super::landmark_weights::LandmarkWeights;
 use super::laying::laid;
@@ -108,7 +108,8 @@ impl TemplateCourse {
         let mask = parts.main.mask.as_deref();
         let rest = RestShape::new(connectivity.clone(), start.clone()).masked(mask);
         let member = Member { scan: &scan.scan, landmarks: &scan.pulls, start };
-        let shape = register_member(&rest, member, settings, &watch, round * per_round)?;
+        let turn = Turn { done: round * per_round, last: round + 1 == self.rounds };
+        let shape = register_member(&rest, member, settings, &watch, turn)?;
         Ok(self.after(round + 1, &scan.scan, shape))
     }
 

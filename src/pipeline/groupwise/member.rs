@@ -5,6 +5,7 @@ use rayon::prelude::*;
 
 use super::RestShape;
 use super::film::fall;
+use super::settle::settle;
 use super::unfold::unfold;
 use crate::energy::LandmarkPull;
 use crate::mesh::{Normals, interpolate};
@@ -14,7 +15,11 @@ use crate::pipeline::{GroupwiseSettings, ScanSurface, SurfaceSample};
 use crate::spatial::{Hit, SurfaceIndex};
 
 /// The system is factored anew after this many iterations; in between it is a good preconditioner.
-const FACTOR_EVERY: usize = 4;
+const FACTOR_EVERY: usize = 8;
+
+/// One vertex in this many seeks its closest point among all in each iteration, before and after the shape has settled;
+/// the others walk to it from their last. Twelve scans came out alike with all of them searching, in a fifth more time.
+const FRESH: [usize; 2] = [4, 2];
 
 /// Weight that keeps a vertex without data where it is.
 const INERTIA: f64 = 0.1;
@@ -48,6 +53,15 @@ pub struct Member<'a> {
     pub start: Vec<Vec3A>,
 }
 
+/// Which of a member's registrations it is.
+#[derive(Debug, Clone, Copy)]
+pub struct Turn {
+    /// Iterations done in those before.
+    pub done: usize,
+    /// None follows: the shape settles on the scan and is unfolded there. From the others only a mean is taken.
+    pub last: bool,
+}
+
 /// Deforms the rest shape to a member, stiff to soft; returns positions `[N, 3]` in the scan's unit space.
 ///
 /// # Errors
@@ -57,18 +71,21 @@ pub fn register_member(
     member: Member,
     settings: &GroupwiseSettings,
     watch: &Watch,
-    first_iteration: usize,
+    turn: Turn,
 ) -> Result<Vec<Vec3A>, Canceled> {
     let mut registration = Registration::new(rest, member, settings);
     for phase in 0..settings.phases {
         registration.enter(phase);
         for iteration in 0..settings.iterations {
             let distance = registration.step(iteration);
-            watch.step(first_iteration + phase * settings.iterations + iteration + 1, distance)?;
+            watch.step(turn.done + phase * settings.iterations + iteration + 1, distance)?;
         }
     }
     let mut p = registration.p;
-    unfold(&rest.connectivity, registration.scan, registration.landmarks, &mut p);
+    if turn.last {
+        settle(rest, registration.scan, &settings.settle, &mut p);
+        unfold(&rest.connectivity, registration.scan, registration.landmarks, &mut p);
+    }
     Ok(p)
 }
 
@@ -121,6 +138,8 @@ struct Phase {
     least_cosine: f32,
     samples: usize,
     fall_beyond: f32,
+    /// One vertex in this many seeks its closest point anew each time; the others walk from their last.
+    fresh: usize,
 }
 
 impl<'a> Registration<'a> {
@@ -164,6 +183,7 @@ impl<'a> Registration<'a> {
             samples: if settled { settings.samples } else { settings.samples / 4 },
             // Settled, every vertex is held by the scan, whichever way it looks: none is left to stick out.
             least_cosine: if held { -1.0 } else { settings.least_cosine },
+            fresh: if settled { FRESH[1] } else { FRESH[0] },
             fall_beyond: if x >= FALLING { settings.fall_beyond } else { 0.0 },
         };
         self.smoother = Some(self.rest.connectivity.diffusion(geometric(settings.smoothing, x)));
@@ -177,7 +197,7 @@ impl<'a> Registration<'a> {
         let connectivity = &self.rest.connectivity;
         self.normals.update(&connectivity.topology, &self.p);
         self.index.refit(&self.p);
-        let mut vertices = self.match_vertices();
+        let mut vertices = self.match_vertices(iteration);
         let mut samples = self.match_samples(&vertices);
         let gradients =
             self.smoother.clone().map(|smoother| self.rest.gradients(&self.p, &smoother, &mut self.buffer));
@@ -240,20 +260,21 @@ impl<'a> Registration<'a> {
         weights
     }
 
-    fn match_vertices(&mut self) -> Vec<Option<VertexHit>> {
+    fn match_vertices(&mut self, iteration: usize) -> Vec<Option<VertexHit>> {
         let (p, normals, scan, rest) = (&self.p, &self.normals.vertices, self.scan, self.rest);
+        let fresh = self.phase.fresh;
         let (search, reach) = (self.phase.normal_search, self.phase.reach);
         let least_cosine = self.phase.least_cosine;
         let closest = |(i, hint): (usize, &mut u32)| {
-            let bound = reach * reach;
-            let hit = scan.index.closest_oriented(
-                p[i],
-                normals[i],
-                search * search,
-                least_cosine,
-                bound,
-                Some(*hint),
-            )?;
+            let (normal_weight, bound) = (search * search, reach * reach);
+            let walked = (iteration > 0 && !(i + iteration).is_multiple_of(fresh)).then(|| {
+                let walked = &scan.walk;
+                walked.closest_oriented(&scan.positions, p[i], normals[i], normal_weight, least_cosine, *hint)
+            });
+            let hit = walked.flatten().filter(|hit| hit.distance_squared < bound).or_else(|| {
+                let index = &scan.index;
+                index.closest_oriented(p[i], normals[i], normal_weight, least_cosine, bound, Some(*hint))
+            })?;
             *hint = hit.triangle;
             // What closes an open scan from within hangs between its walls, which are not for it.
             let (normal, difference) = (scan.normal_at(&hit), p[i] - hit.point);

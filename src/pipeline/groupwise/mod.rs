@@ -6,7 +6,8 @@
 //! deformation costs nothing, whatever its size.
 //!
 //! Cavities that only some members have, as open mouths, are closed by films in the mean; in the late phases these fall
-//! into the scans that have them (`film.rs`). What is folded at the end is unfolded on its scan (`unfold.rs`).
+//! into the scans that have them (`film.rs`). In the end triangles, not vertices, come to lie on the scan (`settle.rs`),
+//! and what is folded is unfolded there (`unfold.rs`).
 
 mod closure;
 mod film;
@@ -14,12 +15,13 @@ mod mean;
 mod member;
 mod redistribution;
 mod rest_shape;
+mod settle;
 mod shared_mesh;
 mod unfold;
 
 pub use closure::close_smoothly;
 pub use mean::mean_shape;
-pub use member::{Member, register_member};
+pub use member::{Member, Turn, register_member};
 pub use redistribution::{need, redistribute};
 pub use rest_shape::RestShape;
 pub use shared_mesh::{SharedMesh, carried};

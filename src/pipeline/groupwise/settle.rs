@@ -1,0 +1,243 @@
+use glam::Vec3A;
+use rayon::prelude::*;
+
+use super::RestShape;
+use crate::mesh::Normals;
+use crate::numeric::{SolveBuffer, SparseCholesky, SymmetricMatrix};
+use crate::pipeline::{ScanSurface, SettleSettings, SurfaceSample};
+use crate::spatial::{Hit, SurfaceIndex, SurfaceWalk};
+
+/// Samples farther than this from the template, in unit space, belong to what it has not entered.
+const REACH: f32 = 0.02;
+
+/// Cosine between the normals of sample and template below which they do not belong together.
+const LEAST_COSINE: f32 = 0.3;
+
+/// Weight of a step against the data, so that vertices without any stay.
+const INERTIA: f64 = 1e-3;
+
+/// Moves a registered shape `[N, 3]` to where its triangles, not its vertices, lie closest to the scan.
+///
+/// A mesh whose vertices lie on a round surface runs below it everywhere between them. Here all samples x_s of the scan
+/// pull the triangles that they lie nearest to, along their own normals n_s, and turn them:
+/// E(d) = sum_s (n_s . (x_s - B_s p))^2 + l^2 |n_s - n_t(p)|^2 + mu sum_edges |d_i - d_j|^2, d the step from p.
+/// Steps of Gauss and Newton bounded from above by a matrix that is alike in x, y and z, in which what slides along the surface
+/// moves little, so that what corresponds stays where it is.
+pub fn settle(rest: &RestShape, scan: &ScanSurface, settings: &SettleSettings, p: &mut [Vec3A]) {
+    if settings.iterations == 0 {
+        return;
+    }
+    let topology = &rest.connectivity.topology;
+    let walk = SurfaceWalk::new(topology);
+    let mut last = nearest(scan, &SurfaceIndex::new(p, &topology.triangles));
+    let mut buffer = SolveBuffer::default();
+    for _ in 0..settings.iterations {
+        let settling = Settling { rest, settings, p, normals: &Normals::new(topology, p) };
+        let matches = settling.matches(scan, &walk, &mut last);
+        let Some(step) = settling.step(&matches, &mut buffer) else { return };
+        p.iter_mut().zip(step).for_each(|(p, step)| *p += step);
+    }
+}
+
+/// The triangle that each sample `[S]` lies nearest to, or [`NOWHERE`].
+fn nearest(scan: &ScanSurface, index: &SurfaceIndex) -> Vec<u32> {
+    let nearest = |sample: &SurfaceSample| {
+        let hit = index.closest_oriented(sample.point, sample.normal, 0.0, LEAST_COSINE, REACH * REACH, None);
+        hit.filter(|_| sample.weight > 0.0).map_or(NOWHERE, |hit| hit.triangle)
+    };
+    scan.samples.par_iter().with_min_len(256).map(nearest).collect()
+}
+
+const NOWHERE: u32 = u32::MAX;
+
+/// A sample and the template point it lies nearest to.
+struct Match {
+    sample: SurfaceSample,
+    hit: Hit,
+    weight: f32,
+}
+
+struct Settling<'a> {
+    rest: &'a RestShape,
+    settings: &'a SettleSettings,
+    p: &'a [Vec3A],
+    normals: &'a Normals,
+}
+
+impl Settling<'_> {
+    /// What the samples lie nearest to, from the last triangles on: the shape moves little from step to step.
+    fn matches(&self, scan: &ScanSurface, walk: &SurfaceWalk, last: &mut [u32]) -> Vec<Match> {
+        let rim = &self.rest.connectivity.rim;
+        let per_sample = self.p.len() as f32 / scan.samples.len().max(1) as f32;
+        let nearest = |(sample, last): (&SurfaceSample, &mut u32)| {
+            if *last == NOWHERE {
+                return None;
+            }
+            let hit = walk.closest_oriented(self.p, sample.point, sample.normal, 0.0, LEAST_COSINE, *last)?;
+            *last = hit.triangle;
+            let weight = per_sample * sample.weight * self.rest.takes_at(hit.triangle, hit.weights);
+            let counts = weight > 0.0
+                && hit.distance_squared < REACH * REACH
+                && !rim.contains(hit.triangle, hit.weights);
+            counts.then_some(Match { sample: *sample, hit, weight })
+        };
+        scan.samples.par_iter().zip(last).with_min_len(256).filter_map(nearest).collect()
+    }
+
+    fn step(&self, matches: &[Match], buffer: &mut SolveBuffer) -> Option<Vec<Vec3A>> {
+        let Settling { rest, settings, p, .. } = self;
+        let topology = &rest.connectivity.topology;
+        let stiffness = f64::from(settings.stiffness);
+        let degree = |i: usize| topology.neighbours.row(i).len() as f64;
+        let mut matrix = SymmetricMatrix {
+            diagonal: (0..p.len()).map(|i| INERTIA + stiffness * degree(i)).collect(),
+            edges: vec![-stiffness; topology.edges.len()],
+        };
+        let mut force = vec![Vec3A::ZERO; p.len()];
+        self.add_distances(matches, &mut force, &mut matrix);
+        self.add_turns(matches, &mut force, &mut matrix);
+        let system = SparseCholesky::new(topology, &matrix, rest.connectivity.dissection()).ok()?;
+        system.solve(&mut force, buffer);
+        Some(force)
+    }
+
+    /// The first term: its negative half gradient, and a bound of its half Hessian.
+    fn add_distances(&self, matches: &[Match], force: &mut [Vec3A], matrix: &mut SymmetricMatrix) {
+        let connectivity = &self.rest.connectivity;
+        for Match { sample, hit, weight } in matches {
+            let off = sample.normal * (sample.normal.dot(sample.point - hit.point) * weight);
+            let corners = connectivity.topology.triangles[hit.triangle as usize];
+            for (&i, w) in corners.iter().zip(hit.weights) {
+                force[i as usize] += off * w;
+            }
+            connectivity.add_point(matrix, hit.triangle, hit.weights, f64::from(*weight));
+        }
+    }
+
+    /// The same of the second.
+    fn add_turns(&self, matches: &[Match], force: &mut [Vec3A], matrix: &mut SymmetricMatrix) {
+        // How the normals of each triangle's samples differ from its own, and how much they weigh.
+        let mut turns = vec![(Vec3A::ZERO, 0f32); self.rest.connectivity.topology.triangles.len()];
+        for Match { sample, hit, weight } in matches {
+            let (turn, sum) = &mut turns[hit.triangle as usize];
+            *turn += (sample.normal - self.normals.triangle(hit.triangle as usize)) * *weight;
+            *sum += weight;
+        }
+        for (triangle, (turn, weight)) in
+            turns.into_iter().enumerate().filter(|(_, (_, weight))| *weight > 0.0)
+        {
+            self.add_turn(triangle as u32, turn, weight, force, matrix);
+        }
+    }
+
+    /// One triangle's part: a step d turns it by -sum_j g_j (d_j . n), g_j the gradients of its barycentric
+    /// coordinates.
+    fn add_turn(
+        &self,
+        triangle: u32,
+        turn: Vec3A,
+        weight: f32,
+        force: &mut [Vec3A],
+        matrix: &mut SymmetricMatrix,
+    ) {
+        let connectivity = &self.rest.connectivity;
+        let corners = connectivity.topology.triangles[triangle as usize];
+        let [a, b, c] = corners.map(|i| self.p[i as usize]);
+        let area = (b - a).cross(c - a);
+        let normal = area.normalize_or_zero();
+        let gradients = [c - b, a - c, b - a].map(|side| normal.cross(side) / area.length().max(1e-9));
+        let share = self.settings.normals * self.settings.normals;
+        for (i, gradient) in corners.into_iter().zip(gradients) {
+            force[i as usize] -= normal * (share * turn.dot(gradient));
+        }
+        let between =
+            |j: usize, k: usize| f64::from(share * weight) * f64::from(gradients[j].dot(gradients[k]));
+        connectivity.add_products(matrix, triangle, between);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::{Icosphere, TriangleMesh, interpolate};
+    use crate::numeric::finite_difference::directional_error;
+    use crate::pipeline::Sphere;
+
+    const SETTINGS: SettleSettings = SettleSettings { iterations: 6, normals: 0.05, stiffness: 0.003 };
+
+    fn bumpy(p: Vec3A) -> Vec3A {
+        p * (1.0 + 0.1 * (4.0 * p.x).sin() * (3.0 * p.y).cos())
+    }
+
+    /// A scan, and a shape whose vertices lie on it.
+    fn inscribed() -> (ScanSurface, RestShape, Vec<Vec3A>) {
+        let fine = Icosphere::new(6);
+        let positions = fine.positions.iter().map(|p| bumpy(p.as_vec3a()).as_dvec3()).collect();
+        let scan = ScanSurface::new(&TriangleMesh::new(positions, fine.triangles).unwrap(), 20_000);
+        let sphere = Sphere::of_level(3);
+        let p: Vec<Vec3A> = sphere.rest.iter().map(|p| scan.to_unit(bumpy(*p).as_dvec3())).collect();
+        (scan, RestShape::new(sphere.connectivity.clone(), p.clone()), p)
+    }
+
+    fn mean_squared_distance(scan: &ScanSurface, rest: &RestShape, p: &[Vec3A]) -> f32 {
+        let index = SurfaceIndex::new(p, &rest.connectivity.topology.triangles);
+        let sum: f32 = scan.samples.iter().map(|s| index.closest(s.point).distance_squared).sum();
+        sum / scan.samples.len() as f32
+    }
+
+    #[test]
+    fn triangles_come_to_lie_on_the_scan_and_vertices_stay_in_their_places() {
+        let (scan, rest, before) = inscribed();
+        let mut p = before.clone();
+        settle(&rest, &scan, &SettleSettings { normals: 0.0, ..SETTINGS }, &mut p);
+        let [on_vertices, on_triangles] = [&before, &p].map(|p| mean_squared_distance(&scan, &rest, p));
+        assert!(on_triangles < 0.35 * on_vertices, "{on_triangles} {on_vertices}");
+        let edge = before[0].distance(before[rest.connectivity.topology.neighbours.row(0)[0] as usize]);
+        let normals = Normals::new(&rest.connectivity.topology, &before).vertices;
+        for ((before, after), normal) in before.iter().zip(&p).zip(&normals) {
+            let step = *after - *before;
+            let slide = step - *normal * normal.dot(step);
+            assert!(slide.length() < 0.05 * edge, "{slide} of {edge}");
+        }
+    }
+
+    #[test]
+    fn forces_are_gradients() {
+        let (scan, rest, mut p) = inscribed();
+        for (i, p) in p.iter_mut().enumerate() {
+            *p *= 1.0 + 0.01 * (i as f32).sin();
+        }
+        let topology = &rest.connectivity.topology;
+        let last = nearest(&scan, &SurfaceIndex::new(&p, &topology.triangles));
+        let normals = Normals::new(topology, &p);
+        let settling = Settling { rest: &rest, settings: &SETTINGS, p: &p, normals: &normals };
+        let matches = settling.matches(&scan, &SurfaceWalk::new(topology), &mut last.clone());
+        assert!(matches.len() > 10_000);
+        let mut matrix =
+            SymmetricMatrix { diagonal: vec![0.0; p.len()], edges: vec![0.0; topology.edges.len()] };
+        let mut force = vec![Vec3A::ZERO; p.len()];
+        settling.add_distances(&matches, &mut force, &mut matrix);
+        settling.add_turns(&matches, &mut force, &mut matrix);
+        let half_gradient: Vec<Vec3A> = force.iter().map(|f| -*f).collect();
+        let error = directional_error(&p, &half_gradient, 1e-4, 5, |p| {
+            let normals = Normals::new(topology, p);
+            let energy = |Match { sample, hit, weight }: &Match| {
+                let at = interpolate(p, topology.triangles[hit.triangle as usize], hit.weights);
+                let off = sample.normal.dot(sample.point - at);
+                let turn = sample.normal - normals.triangle(hit.triangle as usize);
+                f64::from(weight * (off * off + SETTINGS.normals.powi(2) * turn.length_squared()))
+            };
+            0.5 * matches.iter().map(energy).sum::<f64>()
+        });
+        assert!(error < 1e-2, "{error}");
+    }
+
+    #[test]
+    fn what_has_no_data_stays() {
+        let (scan, rest, before) = inscribed();
+        let nothing = vec![0.0; before.len()];
+        let mut p = before.clone();
+        settle(&rest.masked(Some(&nothing)), &scan, &SETTINGS, &mut p);
+        assert_eq!(p, before);
+    }
+}
