@@ -5,6 +5,7 @@ use glam::Vec3A;
 
 use crate::mesh::{Rim, Topology};
 use crate::numeric::{Dissection, SparseCholesky, SymmetricMatrix};
+use crate::spatial::SurfaceWalk;
 
 /// The triangles of a template with what is made for them once and kept: topology, elimination order, factors.
 pub struct Connectivity {
@@ -15,6 +16,7 @@ pub struct Connectivity {
     /// The shape `[N, 3]` that the elimination order is cut by.
     rest: Vec<Vec3A>,
     dissection: OnceLock<Dissection>,
+    walk: OnceLock<SurfaceWalk>,
     /// The edges of each triangle: from its first, second, third corner to the next.
     triangle_edges: Vec<[u32; 3]>,
     diffusions: Mutex<HashMap<u64, Arc<SparseCholesky>>>,
@@ -35,6 +37,7 @@ impl Connectivity {
             topology,
             rest: rest.to_vec(),
             dissection: OnceLock::new(),
+            walk: OnceLock::new(),
             diffusions: Mutex::default(),
         }
     }
@@ -42,6 +45,11 @@ impl Connectivity {
     /// The elimination order of the vertices.
     pub fn dissection(&self) -> &Dissection {
         self.dissection.get_or_init(|| Dissection::new(&self.topology, &self.rest))
+    }
+
+    /// Nearest points from the last answer on.
+    pub fn walk(&self) -> &SurfaceWalk {
+        self.walk.get_or_init(|| SurfaceWalk::new(&self.topology))
     }
 
     /// The solver of (I + lambda L) x = b, factored at its first use.

@@ -21,6 +21,15 @@ const FACTOR_EVERY: usize = 8;
 /// the others walk to it from their last. Twelve scans came out alike with all of them searching, in a fifth more time.
 const FRESH: [usize; 2] = [4, 2];
 
+/// Samples come in so many batches a phase, in turn.
+const BATCHES: usize = 2;
+
+/// One sample in this many seeks its closest point among all each time it comes; the others walk from their last.
+const FRESH_SAMPLES: usize = 4;
+
+/// The last answer of a sample that has none.
+const NOWHERE: u32 = u32::MAX;
+
 /// Weight that keeps a vertex without data where it is.
 const INERTIA: f64 = 0.1;
 
@@ -110,6 +119,8 @@ struct Registration<'a> {
     index: SurfaceIndex,
     hints: Vec<u32>,
     samples_taken: usize,
+    /// For each of a phase's batches of samples, the last answers.
+    sample_hints: Vec<Vec<u32>>,
     buffer: SolveBuffer,
 }
 
@@ -160,6 +171,7 @@ impl<'a> Registration<'a> {
             hints: vec![0; member.start.len()],
             p: member.start,
             samples_taken: 0,
+            sample_hints: Vec::new(),
             buffer: SolveBuffer::default(),
         }
     }
@@ -186,6 +198,8 @@ impl<'a> Registration<'a> {
             fresh: if settled { FRESH[1] } else { FRESH[0] },
             fall_beyond: if x >= FALLING { settings.fall_beyond } else { 0.0 },
         };
+        self.samples_taken += self.sample_hints.iter().map(Vec::len).sum::<usize>();
+        self.sample_hints = vec![vec![NOWHERE; self.phase.samples]; BATCHES];
         self.smoother = Some(self.rest.connectivity.diffusion(geometric(settings.smoothing, x)));
         if phase > 0 {
             self.index = SurfaceIndex::new(&self.p, &self.rest.connectivity.topology.triangles);
@@ -198,7 +212,7 @@ impl<'a> Registration<'a> {
         self.normals.update(&connectivity.topology, &self.p);
         self.index.refit(&self.p);
         let mut vertices = self.match_vertices(iteration);
-        let mut samples = self.match_samples(&vertices);
+        let mut samples = self.match_samples(&vertices, iteration);
         let gradients =
             self.smoother.clone().map(|smoother| self.rest.gradients(&self.p, &smoother, &mut self.buffer));
         if let (true, Some(gradients)) = (self.ends, &gradients) {
@@ -302,7 +316,7 @@ impl<'a> Registration<'a> {
         (0..p.len()).into_par_iter().with_min_len(128).map(one).collect()
     }
 
-    fn match_samples(&mut self, vertices: &[Option<VertexHit>]) -> Vec<Option<SampleHit>> {
+    fn match_samples(&mut self, vertices: &[Option<VertexHit>], iteration: usize) -> Vec<Option<SampleHit>> {
         let (scan, rest, index, settings) = (self.scan, self.rest, &self.index, self.settings);
         let off: Vec<f32> =
             vertices.iter().map(|found| found.map_or(f32::MAX, |f| f.hit.distance_squared)).collect();
@@ -319,18 +333,22 @@ impl<'a> Registration<'a> {
                 difference.dot(index.triangle_normal(hit.triangle)) * difference.dot(sample.normal) >= 0.0;
             distance < settings.slack || (facing && own + settings.slack > settings.own_share * distance)
         };
-        let (search, first) = (self.phase.normal_search, self.samples_taken);
+        let (batch, visit) = (iteration % BATCHES, iteration / BATCHES);
+        let first = self.samples_taken + batch * self.phase.samples;
+        let (p, walk, search) = (&self.p, self.rest.connectivity.walk(), self.phase.normal_search);
         let (sample_reach, per_sample) = (self.phase.sample_reach, self.sample_weight());
-        let closest = |k: usize| {
+        let closest = |(k, last): (usize, &mut u32)| {
             let sample = scan.sample(first + k);
-            let hit = index.closest_oriented(
-                sample.point,
-                sample.normal,
-                search * search,
-                settings.sample_least_cosine,
-                sample_reach * sample_reach,
-                None,
-            );
+            let (point, normal, normal_weight) = (sample.point, sample.normal, search * search);
+            let (least_cosine, bound) = (settings.sample_least_cosine, sample_reach * sample_reach);
+            let walks = *last != NOWHERE && !(k + visit).is_multiple_of(FRESH_SAMPLES);
+            let walked =
+                walks.then(|| walk.closest_oriented(p, point, normal, normal_weight, least_cosine, *last));
+            let hit = walked
+                .flatten()
+                .filter(|hit| hit.distance_squared < bound)
+                .or_else(|| index.closest_oriented(point, normal, normal_weight, least_cosine, bound, None));
+            *last = hit.map_or(NOWHERE, |hit| hit.triangle);
             // What lies beyond the template's rim is not for it.
             let is_for = |hit: &Hit| sample.weight > 0.0 && !rim.contains(hit.triangle, hit.weights);
             let hit = hit.filter(|hit| is_for(hit) && free(&sample, hit))?;
@@ -338,8 +356,7 @@ impl<'a> Registration<'a> {
             let weight = weight * rest.takes_at(hit.triangle, hit.weights);
             (weight > 0.0).then_some(SampleHit { sample, hit, weight })
         };
-        self.samples_taken += self.phase.samples;
-        (0..self.phase.samples).into_par_iter().with_min_len(128).map(closest).collect()
+        self.sample_hints[batch].par_iter_mut().enumerate().with_min_len(128).map(closest).collect()
     }
 
     /// Pull of each matched vertex to its closest point, mostly along the scan's normal, or along its fall.

@@ -5,7 +5,7 @@ use super::RestShape;
 use crate::mesh::Normals;
 use crate::numeric::{SolveBuffer, SparseCholesky, SymmetricMatrix};
 use crate::pipeline::{ScanSurface, SettleSettings, SurfaceSample};
-use crate::spatial::{Hit, SurfaceIndex, SurfaceWalk};
+use crate::spatial::{Hit, SurfaceIndex};
 
 /// Samples farther than this from the template, in unit space, belong to what it has not entered.
 const REACH: f32 = 0.02;
@@ -28,12 +28,11 @@ pub fn settle(rest: &RestShape, scan: &ScanSurface, settings: &SettleSettings, p
         return;
     }
     let topology = &rest.connectivity.topology;
-    let walk = SurfaceWalk::new(topology);
     let mut last = nearest(scan, &SurfaceIndex::new(p, &topology.triangles));
     let mut buffer = SolveBuffer::default();
     for _ in 0..settings.iterations {
         let settling = Settling { rest, settings, p, normals: &Normals::new(topology, p) };
-        let matches = settling.matches(scan, &walk, &mut last);
+        let matches = settling.matches(scan, &mut last);
         let Some(step) = settling.step(&matches, &mut buffer) else { return };
         p.iter_mut().zip(step).for_each(|(p, step)| *p += step);
     }
@@ -66,8 +65,8 @@ struct Settling<'a> {
 
 impl Settling<'_> {
     /// What the samples lie nearest to, from the last triangles on: the shape moves little from step to step.
-    fn matches(&self, scan: &ScanSurface, walk: &SurfaceWalk, last: &mut [u32]) -> Vec<Match> {
-        let rim = &self.rest.connectivity.rim;
+    fn matches(&self, scan: &ScanSurface, last: &mut [u32]) -> Vec<Match> {
+        let (rim, walk) = (&self.rest.connectivity.rim, self.rest.connectivity.walk());
         let per_sample = self.p.len() as f32 / scan.samples.len().max(1) as f32;
         let nearest = |(sample, last): (&SurfaceSample, &mut u32)| {
             if *last == NOWHERE {
@@ -211,7 +210,7 @@ mod tests {
         let last = nearest(&scan, &SurfaceIndex::new(&p, &topology.triangles));
         let normals = Normals::new(topology, &p);
         let settling = Settling { rest: &rest, settings: &SETTINGS, p: &p, normals: &normals };
-        let matches = settling.matches(&scan, &SurfaceWalk::new(topology), &mut last.clone());
+        let matches = settling.matches(&scan, &mut last.clone());
         assert!(matches.len() > 10_000);
         let mut matrix =
             SymmetricMatrix { diagonal: vec![0.0; p.len()], edges: vec![0.0; topology.edges.len()] };
