@@ -180,7 +180,8 @@ pub struct GroupwiseSettings {
 pub struct SettleSettings {
     /// How often all samples are matched anew.
     pub iterations: usize,
-    /// The length l, in unit space, at which a distance counts as much as a normal turned by one radian.
+    /// The distance that counts as much as a normal turned by one radian, as a share of the triangle's size (the root of
+    /// twice its area).
     pub normals: f32,
     /// Stiffness mu of a step.
     pub stiffness: f32,
