@@ -1,0 +1,100 @@
+use crate::render::{Light, View};
+
+/// The buffers' numbers in `shaders/common.wgsl`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u32)]
+pub enum Binding {
+    Batch = 0,
+    Views,
+    Positions,
+    Normals,
+    Albedo,
+    Triangles,
+    Edges,
+    CornerRows,
+    EndRows,
+    Targets,
+    Corners,
+    Ids,
+    Colours,
+    Marks,
+    Pulled,
+    StripLosses,
+    TriangleGradients,
+    EdgeGradients,
+    Result,
+    /// [`Self::Corners`], where vertices are drawn: to read alone.
+    Drawn,
+}
+
+/// Threads in a row of pixels.
+pub const ROW: u32 = 64;
+
+/// Rows of pixels whose loss is summed by one row of threads.
+pub const STRIP: u32 = 16;
+
+/// Numbers of a triangle's gradient, with albedo.
+pub const TRIANGLE_GRADIENT: u64 = 27;
+
+/// Numbers of an edge's gradient.
+pub const EDGE_GRADIENT: u64 = 6;
+
+/// `Batch` of the shaders.
+#[derive(Debug, Clone, Copy, Default, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub struct BatchUniform {
+    pub views: u32,
+    pub vertices: u32,
+    pub triangles: u32,
+    pub edges: u32,
+    pub closed: u32,
+    pub with_albedo: u32,
+    pub strips: u32,
+    pub scale: f32,
+}
+
+/// `View` of the shaders.
+#[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub struct ViewUniform {
+    rows: [[f32; 4]; 3],
+    light: [[f32; 4]; 9],
+    background: [f32; 4],
+    size: [u32; 2],
+    stride: u32,
+    ids: u32,
+    pixels: u32,
+    target_pixels: u32,
+    padding: [u32; 2],
+}
+
+impl ViewUniform {
+    /// A view that begins at places among the ids, the pixels and the targets' pixels.
+    pub fn new(view: &View, light: &Light, background: [f32; 3], places: Places) -> Self {
+        let filled = |[r, g, b]: [f32; 3]| [r, g, b, 0.0];
+        Self {
+            rows: view.projection(),
+            light: light.0.map(filled),
+            background: filled(background),
+            size: view.intrinsics.size,
+            stride: stride(view),
+            ids: places.ids,
+            pixels: places.pixels,
+            target_pixels: places.target_pixels,
+            padding: [0; 2],
+        }
+    }
+}
+
+/// Where a view begins.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Places {
+    pub ids: u32,
+    pub pixels: u32,
+    pub target_pixels: u32,
+}
+
+/// Ids in a row of a view: textures are copied to rows of 256 bytes.
+pub fn stride(view: &View) -> u32 {
+    view.intrinsics.size[0].next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT / 4)
+}
