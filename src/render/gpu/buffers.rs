@@ -25,9 +25,13 @@ pub struct Buffers {
     colours: wgpu::Buffer,
     marks: wgpu::Buffer,
     pulled: wgpu::Buffer,
+    blends: wgpu::Buffer,
     strip_losses: wgpu::Buffer,
     triangle_gradients: wgpu::Buffer,
     edge_gradients: wgpu::Buffer,
+    edge_losses: wgpu::Buffer,
+    silhouettes: wgpu::Buffer,
+    silhouette_count: wgpu::Buffer,
     result: wgpu::Buffer,
     /// What is read back.
     pub read: wgpu::Buffer,
@@ -55,7 +59,7 @@ impl Buffers {
         let inner = BufferUsages::STORAGE | BufferUsages::COPY_SRC;
         let output = BufferUsages::STORAGE | BufferUsages::COPY_SRC | BufferUsages::COPY_DST;
         let numbers = |bytes: usize| bytes as u64 / 4;
-        let results = 9 * vertices + room.views;
+        let results = 9 * vertices + u64::from(ROW) * room.views;
         let [seen, depth] = [(IDS, room.views as u32), (DEPTH, 1)].map(|(format, layers)| {
             let read =
                 if format == IDS { wgpu::TextureUsages::COPY_SRC } else { wgpu::TextureUsages::empty() };
@@ -74,11 +78,15 @@ impl Buffers {
             corners: empty(inner, 4 * vertices * room.views),
             ids: empty(output, room.ids),
             colours: empty(inner, 4 * room.pixels),
-            marks: empty(inner, 2 * room.pixels),
-            pulled: empty(output, 4 * room.pixels),
+            marks: empty(output, 2 * room.pixels),
+            pulled: empty(inner, 4 * room.pixels),
+            blends: empty(inner, 4 * room.pixels),
             strip_losses: empty(inner, u64::from(ROW * room.strips) * room.views),
             triangle_gradients: empty(inner, TRIANGLE_GRADIENT * triangles * room.views),
-            edge_gradients: empty(inner, EDGE_GRADIENT * edges * room.views),
+            edge_gradients: empty(output, EDGE_GRADIENT * edges * room.views),
+            edge_losses: empty(output, edges * room.views),
+            silhouettes: empty(inner, edges * room.views),
+            silhouette_count: empty(output | BufferUsages::INDIRECT, 4),
             result: empty(output, results),
             read: empty(BufferUsages::MAP_READ | BufferUsages::COPY_DST, results),
             layers: (0..room.views as u32).map(|layer| single_layer(&seen, layer)).collect(),
@@ -105,9 +113,13 @@ impl Buffers {
             Binding::Colours => &self.colours,
             Binding::Marks => &self.marks,
             Binding::Pulled => &self.pulled,
+            Binding::Blends => &self.blends,
             Binding::StripLosses => &self.strip_losses,
             Binding::TriangleGradients => &self.triangle_gradients,
             Binding::EdgeGradients => &self.edge_gradients,
+            Binding::EdgeLosses => &self.edge_losses,
+            Binding::Silhouettes => &self.silhouettes,
+            Binding::SilhouetteCount => &self.silhouette_count,
             Binding::Result => &self.result,
         }
     }

@@ -47,6 +47,7 @@ pub struct Kernels {
     pub shade: Kernel<wgpu::ComputePipeline>,
     pub silhouette: Kernel<wgpu::ComputePipeline>,
     pub loss: Kernel<wgpu::ComputePipeline>,
+    pub blend: Kernel<wgpu::ComputePipeline>,
     pub picture: Kernel<wgpu::ComputePipeline>,
     pub silhouette_backward: Kernel<wgpu::ComputePipeline>,
     pub backward: Kernel<wgpu::ComputePipeline>,
@@ -70,43 +71,60 @@ impl Kernels {
             shade: kernel!(
                 device,
                 "shade",
-                [Batch, Views, Normals, Albedo, Triangles, Corners, Ids, Colours, Marks]
+                [Batch, Views, Normals, Albedo, Triangles, Corners, Ids, Colours]
             ),
-            silhouette: kernel!(device, "silhouette", [Batch, Views, Triangles, Edges, Corners, Ids, Marks]),
-            loss: kernel!(
+            silhouette: kernel!(
                 device,
-                "loss",
-                [Batch, Views, Edges, Targets, Corners, Colours, Marks, Pulled, StripLosses]
+                "silhouette",
+                [Batch, Views, Triangles, Edges, Corners, Ids, Marks, Silhouettes, SilhouetteCount]
             ),
-            picture: kernel!(device, "picture", [Batch, Views, Edges, Corners, Ids, Colours, Marks, Pulled]),
+            loss: kernel!(device, "loss", [Batch, Views, Targets, Colours, Pulled, StripLosses]),
+            blend: kernel!(
+                device,
+                "blend",
+                [
+                    Batch,
+                    Views,
+                    Edges,
+                    Targets,
+                    Corners,
+                    Colours,
+                    Marks,
+                    Blends,
+                    EdgeLosses,
+                    Silhouettes,
+                    SilhouetteCount
+                ]
+            ),
+            picture: kernel!(device, "picture", [Batch, Views, Edges, Corners, Ids, Colours, Marks, Blends]),
             silhouette_backward: kernel!(
                 device,
                 "silhouette_backward",
-                [Batch, Views, Edges, Corners, Colours, Marks, Pulled, EdgeGradients]
+                [
+                    Batch,
+                    Views,
+                    Edges,
+                    Corners,
+                    Colours,
+                    Marks,
+                    Pulled,
+                    Blends,
+                    EdgeGradients,
+                    Silhouettes,
+                    SilhouetteCount
+                ]
             ),
             backward: kernel!(
                 device,
                 "backward",
-                [
-                    Batch,
-                    Views,
-                    Normals,
-                    Albedo,
-                    Triangles,
-                    Edges,
-                    Corners,
-                    Ids,
-                    Marks,
-                    Pulled,
-                    TriangleGradients
-                ]
+                [Batch, Views, Normals, Albedo, Triangles, Corners, Ids, Pulled, TriangleGradients]
             ),
             gather: kernel!(
                 device,
                 "gather",
                 [Batch, CornerRows, EndRows, TriangleGradients, EdgeGradients, Result]
             ),
-            total: kernel!(device, "total", [Batch, Views, StripLosses, Result]),
+            total: kernel!(device, "total", [Batch, Views, StripLosses, EdgeLosses, Result]),
         }
     }
 }

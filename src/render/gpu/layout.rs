@@ -19,9 +19,13 @@ pub enum Binding {
     Colours,
     Marks,
     Pulled,
+    Blends,
     StripLosses,
     TriangleGradients,
     EdgeGradients,
+    EdgeLosses,
+    Silhouettes,
+    SilhouetteCount,
     Result,
     /// [`Self::Corners`], where vertices are drawn: to read alone.
     Drawn,

@@ -20,7 +20,7 @@ use glam::Vec3A;
 
 use self::device::Device;
 use self::kernels::Kernels;
-use self::layout::Binding;
+use self::layout::{Binding, ROW};
 use self::passes::{Loaded, Pass};
 use super::connectivity::Connectivity;
 use super::{
@@ -108,7 +108,7 @@ impl Gpu {
             }
             device.queue.submit([encoder.finish()]);
         }
-        let numbers = width(surface) * mesh.vertices + loaded.room.views as usize;
+        let numbers = width(surface) * mesh.vertices + ROW as usize * loaded.room.views as usize;
         let mut encoder = device.device.create_command_encoder(&Default::default());
         encoder.copy_buffer_to_buffer(result, 0, &loaded.buffers.read, 0, 4 * numbers as u64);
         device.queue.submit([encoder.finish()]);
@@ -130,7 +130,7 @@ impl Gpu {
         let numbers = 4 * view.pixels();
         let usage = wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST;
         let read = buffers::buffer(&device.device, usage, numbers as u64);
-        let picture = loaded.buffers.get(Binding::Pulled, &read);
+        let picture = loaded.buffers.get(Binding::Blends, &read);
         encoder.copy_buffer_to_buffer(picture, 0, &read, 0, 4 * numbers as u64);
         device.queue.submit([encoder.finish()]);
         let picture = device.read(&read, numbers)?;

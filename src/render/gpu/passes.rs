@@ -14,6 +14,7 @@ pub enum Pass {
     Shade,
     Silhouette,
     Loss,
+    Blend,
     SilhouetteBackward,
     Backward,
     Gather,
@@ -23,12 +24,13 @@ pub enum Pass {
 
 impl Pass {
     /// What gives a loss and its gradient.
-    pub const LOSS: [Self; 9] = [
+    pub const LOSS: [Self; 10] = [
         Self::Project,
         Self::Raster,
         Self::Shade,
         Self::Silhouette,
         Self::Loss,
+        Self::Blend,
         Self::SilhouetteBackward,
         Self::Backward,
         Self::Gather,
@@ -47,6 +49,7 @@ impl Pass {
             Self::Shade => "shade",
             Self::Silhouette => "silhouette",
             Self::Loss => "loss",
+            Self::Blend => "blend",
             Self::SilhouetteBackward => "silhouette_backward",
             Self::Backward => "backward",
             Self::Gather => "gather",
@@ -66,6 +69,15 @@ pub struct Loaded {
     counts: BatchUniform,
 }
 
+/// How many threads a pass has.
+#[derive(Debug, Clone, Copy)]
+enum Threads {
+    /// So many workgroups.
+    Groups([u32; 3]),
+    /// One for each silhouette, which the device counts.
+    OfSilhouettes,
+}
+
 /// A run of targets with the kernels' buffers.
 #[derive(Debug)]
 struct Chunk {
@@ -73,7 +85,7 @@ struct Chunk {
     /// Where each begins among the pixels of the run.
     begins: Vec<u32>,
     /// For each pass.
-    groups: [wgpu::BindGroup; 10],
+    groups: [wgpu::BindGroup; 11],
 }
 
 /// Views that are worked on at once.
@@ -175,21 +187,35 @@ impl Loaded {
         let [_, rows] = batch.room.size;
         let columns = batch.room.size[0].div_ceil(ROW);
         let groups = |threads: u32| threads.div_ceil(64);
-        let (kernel, [x, y, z]) = match pass {
-            Pass::Project => (&kernels.project, [groups(vertices), views, 1]),
-            Pass::Shade => (&kernels.shade, [columns, rows, views]),
-            Pass::Silhouette => (&kernels.silhouette, [groups(edges), views, 1]),
-            Pass::Loss => (&kernels.loss, [1, rows.div_ceil(STRIP), views]),
-            Pass::SilhouetteBackward => (&kernels.silhouette_backward, [groups(edges), views, 1]),
-            Pass::Backward => (&kernels.backward, [groups(triangles), views, 1]),
-            Pass::Gather => (&kernels.gather, [groups(vertices), 1, 1]),
-            Pass::Total => (&kernels.total, [views, 1, 1]),
-            Pass::Raster | Pass::Picture => (&kernels.picture, [columns, rows, views]),
+        let (kernel, threads) = match pass {
+            Pass::Project => (&kernels.project, Threads::Groups([groups(vertices), views, 1])),
+            Pass::Shade => (&kernels.shade, Threads::Groups([columns, rows, views])),
+            Pass::Silhouette => (&kernels.silhouette, Threads::Groups([groups(edges), views, 1])),
+            Pass::Loss => (&kernels.loss, Threads::Groups([1, rows.div_ceil(STRIP), views])),
+            Pass::Blend => (&kernels.blend, Threads::OfSilhouettes),
+            Pass::SilhouetteBackward => (&kernels.silhouette_backward, Threads::OfSilhouettes),
+            Pass::Backward => (&kernels.backward, Threads::Groups([groups(triangles), views, 1])),
+            Pass::Gather => (&kernels.gather, Threads::Groups([groups(vertices), 1, 1])),
+            Pass::Total => (&kernels.total, Threads::Groups([1, views, 1])),
+            Pass::Raster | Pass::Picture => (&kernels.picture, Threads::Groups([columns, rows, views])),
         };
+        let buffer = |binding| self.buffers.get(binding, &self.buffers.read);
+        if pass == Pass::Silhouette {
+            for zeroed in
+                [Binding::Marks, Binding::SilhouetteCount, Binding::EdgeLosses, Binding::EdgeGradients]
+            {
+                encoder.clear_buffer(buffer(zeroed), 0, None);
+            }
+        }
         let mut recorded = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
         recorded.set_pipeline(&kernel.pipeline);
         recorded.set_bind_group(0, &self.chunks[batch.chunk].groups[pass as usize], &[]);
-        recorded.dispatch_workgroups(x, y, z);
+        match threads {
+            Threads::Groups([x, y, z]) => recorded.dispatch_workgroups(x, y, z),
+            Threads::OfSilhouettes => {
+                recorded.dispatch_workgroups_indirect(buffer(Binding::SilhouetteCount), 0);
+            }
+        }
     }
 
     fn encode_raster(&self, kernels: &Kernels, batch: &Batch, encoder: &mut wgpu::CommandEncoder) {
@@ -262,6 +288,7 @@ impl Chunk {
             bound(&kernels.shade),
             bound(&kernels.silhouette),
             bound(&kernels.loss),
+            bound(&kernels.blend),
             bound(&kernels.silhouette_backward),
             bound(&kernels.backward),
             bound(&kernels.gather),

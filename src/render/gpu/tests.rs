@@ -197,17 +197,42 @@ fn silhouette() {
 }
 
 #[test]
-fn loss() {
+fn loss_and_blend() {
     for_all(|mut ran| {
-        let pulled = ran.read(Binding::Pulled, 4 * ran.pixels());
-        let pulled: Vec<f32> = pulled.chunks_exact(4).flat_map(|pixel| pixel[..3].to_vec()).collect();
+        // With respect to the blended colours where some are blended, and to all before they are.
+        let pixels = ran.pixels();
+        let [pulled, blends] = [Binding::Pulled, Binding::Blends].map(|binding| {
+            let numbers = ran.read(binding, 4 * pixels);
+            numbers.chunks_exact(4).map(Vec3A::from_slice).collect::<Vec<_>>()
+        });
         let twins = ran.twins();
-        let twin: Vec<f32> = twins.iter().flat_map(|(frame, _)| flat(&frame.picture)).collect();
-        assert!(difference(pulled.iter(), twin.iter()) < 1e-6);
+        let twin: Vec<Vec3A> = twins.iter().flat_map(|(frame, _)| frame.unblended.clone()).collect();
+        let error = difference(flat(&pulled).iter(), flat(&twin).iter());
+        assert!(error < 0.01, "{error}");
+        let mut first = 0;
+        let (mut found, mut wanted) = (Vec::new(), Vec::new());
+        for (frame, _) in &twins {
+            for (_, crossing) in &frame.crossings {
+                let (pixel, ..) = crossing.blend();
+                found.push(blends[first + pixel]);
+                wanted.push(frame.picture[pixel]);
+            }
+            first += frame.picture.len();
+        }
+        let error = difference(flat(&found).iter(), flat(&wanted).iter());
+        assert!(wanted.len() > 200 && error < 0.05, "{error}");
+    });
+}
+
+#[test]
+fn total() {
+    for_all(|mut ran| {
         let [width, vertices] = [if ran.with_albedo { 9 } else { 6 }, ran.shape.positions.len()];
-        let values = ran.read(Binding::Result, width * vertices + ran.targets.len());
-        for (value, (frame, _)) in values[width * vertices..].iter().zip(&twins) {
-            assert!((f64::from(*value) / frame.value - 1.0).abs() < 1e-4, "{value} {}", frame.value);
+        let row = ROW as usize;
+        let values = ran.read(Binding::Result, width * vertices + row * ran.targets.len());
+        for (values, (frame, _)) in values[width * vertices..].chunks_exact(row).zip(ran.twins()) {
+            let value: f64 = values.iter().map(|&value| f64::from(value)).sum();
+            assert!((value / frame.value - 1.0).abs() < 1e-4, "{value} {}", frame.value);
         }
     });
 }
@@ -221,13 +246,16 @@ fn backward() {
         let surface = ran.surface();
         let closed = !ran.shape.topology.on_rim.contains(&true);
         let mut twin = Vec::new();
-        // But for triangles whose pixels are not the same: one pixel of a sliver asks much.
+        // But for triangles one of whose pixels is not the same: of a sliver it asks much.
         let mut others = vec![false; triangles.len() * ran.targets.len()];
-        let ids = ids(&mut ran);
+        let pixels = ran.pixels();
+        let (ids, pulled) = (ids(&mut ran), ran.read(Binding::Pulled, 4 * pixels));
+        let mut pulled = pulled.chunks_exact(4).map(Vec3A::from_slice);
         for (view, (target, (frame, _))) in ran.targets.iter().zip(ran.twins()).enumerate() {
-            for (&one, &other) in ids[view].iter().zip(&frame.raster.ids).filter(|(one, other)| one != other)
-            {
-                for id in [one, other].into_iter().filter(|&id| id != 0) {
+            for (at, (&one, &other)) in ids[view].iter().zip(&frame.raster.ids).enumerate() {
+                let apart = pulled.next().unwrap().distance(frame.unblended[at]);
+                let differ = one != other || apart > 1e-3 * ran.scale();
+                for id in [one, other].into_iter().filter(|&id| differ && id != 0) {
                     others[view * triangles.len() + id as usize - 1] = true;
                 }
             }

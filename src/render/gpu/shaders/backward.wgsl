@@ -1,7 +1,7 @@
 // What the pixels of each triangle in each view ask of its corners: 3 by (position, normal, albedo where there is any).
 @compute @workgroup_size(64)
-fn backward(@builtin(global_invocation_id) id: vec3<u32>) {
-    let view = id.y;
+fn backward(@builtin(global_invocation_id) id: vec3<u32>, @builtin(workgroup_id) group: vec3<u32>) {
+    let view = group.y;
     let triangle = id.x;
     if triangle >= batch.triangles {
         return;
@@ -32,6 +32,10 @@ fn backward(@builtin(global_invocation_id) id: vec3<u32>) {
         r1 = albedo[ends.y].xyz;
         r2 = albedo[ends.z].xyz;
     }
+    let light = views[view].light;
+    let start = views[view].pixels;
+    let ids_start = views[view].ids;
+    let stride = views[view].stride;
     let h0 = seen_from(c0, low);
     let h1 = seen_from(c1, low);
     let h2 = seen_from(c2, low);
@@ -52,12 +56,12 @@ fn backward(@builtin(global_invocation_id) id: vec3<u32>) {
         let first = vec2<u32>(low);
         let last = vec2<u32>(high);
         for (var y = first.y; y <= last.y; y++) {
-            let row = views[view].ids + y * views[view].stride;
+            let row = ids_start + y * stride;
             for (var x = first.x; x <= last.x; x++) {
                 if ids[row + x] != triangle + 1u {
                     continue;
                 }
-                let pull = unblended(view, vec2<u32>(x, y));
+                let pull = pulled[start + y * size.x + x].xyz;
                 let spot = vec3<f32>(f32(x) - low.x, f32(y) - low.y, 1.0);
                 let a = vec3<f32>(dot(plane0, spot), dot(plane1, spot), dot(plane2, spot));
                 let inverse_sum = inverse_of(a.x + a.y + a.z);
@@ -68,14 +72,14 @@ fn backward(@builtin(global_invocation_id) id: vec3<u32>) {
                 var lit = pull;
                 var by_weight = vec3<f32>(0.0);
                 if batch.with_albedo != 0u {
-                    let of_albedo = pull * light_colour(view, n);
+                    let of_albedo = pull * light_colour(light, n);
                     albedo0 += of_albedo * weights.x;
                     albedo1 += of_albedo * weights.y;
                     albedo2 += of_albedo * weights.z;
                     by_weight = vec3<f32>(dot(of_albedo, r0), dot(of_albedo, r1), dot(of_albedo, r2));
                     lit *= r0 * weights.x + r1 * weights.y + r2 * weights.z;
                 }
-                let of_unit = light_gradient(view, n, lit);
+                let of_unit = light_gradient(light, n, lit);
                 let of_normal = (of_unit - n * dot(n, of_unit)) * inverse_length;
                 normal0 += of_normal * weights.x;
                 normal1 += of_normal * weights.y;
@@ -118,41 +122,15 @@ fn position_gradient(view: u32, pixel: vec2<f32>, h: vec3<f32>) -> vec3<f32> {
         + views[view].rows[2].xyz * (h.z - dot(pixel + 0.5, h.xy));
 }
 
-fn light_gradient(view: u32, n: vec3<f32>, lit: vec3<f32>) -> vec3<f32> {
-    let xy = dot(views[view].light[4].xyz, lit);
-    let yz = dot(views[view].light[5].xyz, lit);
-    let zz = 6.0 * dot(views[view].light[6].xyz, lit);
-    let xz = dot(views[view].light[7].xyz, lit);
-    let xx = 2.0 * dot(views[view].light[8].xyz, lit);
+fn light_gradient(light: array<vec4<f32>, 9>, n: vec3<f32>, lit: vec3<f32>) -> vec3<f32> {
+    let xy = dot(light[4].xyz, lit);
+    let yz = dot(light[5].xyz, lit);
+    let zz = 6.0 * dot(light[6].xyz, lit);
+    let xz = dot(light[7].xyz, lit);
+    let xx = 2.0 * dot(light[8].xyz, lit);
     return vec3<f32>(
-        dot(views[view].light[1].xyz, lit) + xy * n.y + xz * n.z + xx * n.x,
-        dot(views[view].light[2].xyz, lit) + xy * n.x + yz * n.z - xx * n.y,
-        dot(views[view].light[3].xyz, lit) + yz * n.y + xz * n.x + zz * n.z,
+        dot(light[1].xyz, lit) + xy * n.y + xz * n.z + xx * n.x,
+        dot(light[2].xyz, lit) + xy * n.x + yz * n.z - xx * n.y,
+        dot(light[3].xyz, lit) + yz * n.y + xz * n.x + zz * n.z,
     );
-}
-
-// The gradient with respect to a pixel's colour before it was blended.
-fn unblended(view: u32, pixel: vec2<u32>) -> vec3<f32> {
-    let width = views[view].size.x;
-    let at = views[view].pixels + pixel.y * width + pixel.x;
-    let own = pulled[at];
-    if own.w == 0.0 {
-        return own.xyz;
-    }
-    let shares = shares_of(view, pixel);
-    let taken = max(shares, vec4<f32>(0.0));
-    var pull = own.xyz * (1.0 - taken.x - taken.y - taken.z - taken.w);
-    if shares.x < 0.0 {
-        pull -= pulled[at + 1u].xyz * shares.x;
-    }
-    if shares.y < 0.0 {
-        pull -= pulled[at + width].xyz * shares.y;
-    }
-    if shares.z < 0.0 {
-        pull -= pulled[at - 1u].xyz * shares.z;
-    }
-    if shares.w < 0.0 {
-        pull -= pulled[at - width].xyz * shares.w;
-    }
-    return pull;
 }

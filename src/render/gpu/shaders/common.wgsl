@@ -54,13 +54,21 @@ const STRIP: u32 = 16u;
 @group(0) @binding(11) var<storage, read> ids: array<u32>;
 @group(0) @binding(12) var<storage, read_write> colours: array<vec4<f32>>;
 @group(0) @binding(13) var<storage, read_write> marks: array<u32>;
-// The gradient with respect to blended colours, and 1 where some are blended near by; pictures where they are asked for.
+// The gradient with respect to the colours.
 @group(0) @binding(14) var<storage, read_write> pulled: array<vec4<f32>>;
-@group(0) @binding(15) var<storage, read_write> strip_losses: array<f32>;
-@group(0) @binding(16) var<storage, read_write> triangle_gradients: array<f32>;
-@group(0) @binding(17) var<storage, read_write> edge_gradients: array<vec2<f32>>;
-// 6 or 9 numbers a vertex, then each view's loss; batches add to those before.
-@group(0) @binding(18) var<storage, read_write> result: array<f32>;
+// The same with respect to blended colours, at pixels that are marked; pictures where they are asked for.
+@group(0) @binding(15) var<storage, read_write> blends: array<vec4<f32>>;
+@group(0) @binding(16) var<storage, read_write> strip_losses: array<f32>;
+@group(0) @binding(17) var<storage, read_write> triangle_gradients: array<f32>;
+@group(0) @binding(18) var<storage, read_write> edge_gradients: array<vec2<f32>>;
+// What blending adds to the loss, for each edge in each view.
+@group(0) @binding(19) var<storage, read_write> edge_losses: array<f32>;
+// Edges that are silhouettes, as view * edges + edge, in any order.
+@group(0) @binding(20) var<storage, read> silhouettes: array<u32>;
+// Workgroups for them (x, y, z), and how many they are.
+@group(0) @binding(21) var<storage, read> silhouette_count: array<u32>;
+// 6 or 9 numbers a vertex, then ROW sums of each view's loss; batches add to those before.
+@group(0) @binding(22) var<storage, read_write> result: array<f32>;
 
 fn corner(view: u32, vertex: u32) -> vec4<f32> {
     return corners[view * batch.vertices + vertex];
@@ -90,11 +98,11 @@ fn inverse_of(sum: f32) -> f32 {
     return select(1.0 / sum, 0.0, sum == 0.0);
 }
 
-fn light_colour(view: u32, n: vec3<f32>) -> vec3<f32> {
-    return views[view].light[0].xyz + views[view].light[1].xyz * n.x + views[view].light[2].xyz * n.y
-        + views[view].light[3].xyz * n.z + views[view].light[4].xyz * (n.x * n.y)
-        + views[view].light[5].xyz * (n.y * n.z) + views[view].light[6].xyz * (3.0 * n.z * n.z - 1.0)
-        + views[view].light[7].xyz * (n.x * n.z) + views[view].light[8].xyz * (n.x * n.x - n.y * n.y);
+fn light_colour(light: array<vec4<f32>, 9>, n: vec3<f32>) -> vec3<f32> {
+    return light[0].xyz + light[1].xyz * n.x + light[2].xyz * n.y
+        + light[3].xyz * n.z + light[4].xyz * (n.x * n.y)
+        + light[5].xyz * (n.y * n.z) + light[6].xyz * (3.0 * n.z * n.z - 1.0)
+        + light[7].xyz * (n.x * n.z) + light[8].xyz * (n.x * n.x - n.y * n.y);
 }
 
 // Silhouettes, as `silhouette.rs` of the reference.
@@ -186,47 +194,41 @@ fn place_of(view: u32, mark: u32, axis: u32, pixel: vec2<u32>) -> f32 {
     return crossing_of(s, line, views[view].size).place;
 }
 
-// What is blended at a pixel: the share of the other's colour with each of its four neighbours, right, below, left, above;
-// negative where it is the neighbour that takes of this one's.
-fn shares_of(view: u32, pixel: vec2<u32>) -> vec4<f32> {
-    let size = views[view].size;
-    let at = views[view].pixels + pixel.y * size.x + pixel.x;
-    var shares = vec4<f32>(0.0);
-    let right = marks[2u * at];
-    let below = marks[2u * at + 1u];
-    if right != 0u {
-        shares.x = 0.5 - place_of(view, right, 0u, pixel);
-    }
-    if below != 0u {
-        shares.y = 0.5 - place_of(view, below, 1u, pixel);
-    }
+// Whether a mark is the first of its pixel's four, in whose name the pixel is worked on: 0 to 3 for those on the right, below,
+// on the left, above.
+fn is_first(view: u32, pixel: vec2<u32>, side: u32) -> bool {
+    let all = marks_of(view, pixel);
+    let before = vec4<u32>(0u, all.x, all.x | all.y, all.x | all.y | all.z);
+    return before[side] == 0u;
+}
+
+// Marks on a pixel's right, below it, on its left and above.
+fn marks_of(view: u32, pixel: vec2<u32>) -> vec4<u32> {
+    let width = views[view].size.x;
+    let at = 2u * (views[view].pixels + pixel.y * width + pixel.x);
+    var all = vec4<u32>(marks[at], marks[at + 1u], 0u, 0u);
     if pixel.x > 0u {
-        let left = marks[2u * (at - 1u)];
-        if left != 0u {
-            shares.z = place_of(view, left, 0u, pixel - vec2<u32>(1u, 0u)) - 0.5;
-        }
+        all.z = marks[at - 2u];
     }
     if pixel.y > 0u {
-        let above = marks[2u * (at - size.x) + 1u];
-        if above != 0u {
-            shares.w = place_of(view, above, 1u, pixel - vec2<u32>(0u, 1u)) - 0.5;
+        all.w = marks[at - 2u * width + 1u];
+    }
+    return all;
+}
+
+// What is blended at a pixel: the share of the other's colour with each of its four neighbours, in the order of its marks;
+// negative where it is the neighbour that takes of this one's.
+fn shares_of(view: u32, pixel: vec2<u32>) -> vec4<f32> {
+    let all = marks_of(view, pixel);
+    var shares = vec4<f32>(0.0);
+    for (var side = 0u; side < 4u; side++) {
+        if all[side] != 0u {
+            let first = pixel - select(vec2<u32>(0u), vec2<u32>(1u - side % 2u, side % 2u), side > 1u);
+            let share = 0.5 - place_of(view, all[side], side % 2u, first);
+            shares[side] = select(share, -share, side > 1u);
         }
     }
     return shares;
-}
-
-// Whether any of a pixel's four marks is there.
-fn is_marked(view: u32, pixel: vec2<u32>) -> bool {
-    let width = views[view].size.x;
-    let at = views[view].pixels + pixel.y * width + pixel.x;
-    var any = marks[2u * at] | marks[2u * at + 1u];
-    if pixel.x > 0u {
-        any |= marks[2u * (at - 1u)];
-    }
-    if pixel.y > 0u {
-        any |= marks[2u * (at - width) + 1u];
-    }
-    return any != 0u;
 }
 
 fn blended(view: u32, pixel: vec2<u32>) -> vec3<f32> {

@@ -1,12 +1,13 @@
 // The blended colours, and whether a pixel's centre sees the surface.
 @compute @workgroup_size(64)
-fn picture(@builtin(global_invocation_id) id: vec3<u32>) {
-    let view = id.z;
+fn picture(@builtin(global_invocation_id) id: vec3<u32>, @builtin(workgroup_id) group: vec3<u32>) {
+    let view = group.z;
+    let y = group.y;
     let size = views[view].size;
-    if id.x >= size.x || id.y >= size.y {
+    if id.x >= size.x || y >= size.y {
         return;
     }
-    let seen = ids[views[view].ids + id.y * views[view].stride + id.x];
-    let at = views[view].pixels + id.y * size.x + id.x;
-    pulled[at] = vec4<f32>(blended(view, id.xy), select(1.0, 0.0, seen == 0u));
+    let seen = ids[views[view].ids + y * views[view].stride + id.x];
+    let at = views[view].pixels + y * size.x + id.x;
+    blends[at] = vec4<f32>(blended(view, vec2<u32>(id.x, y)), select(1.0, 0.0, seen == 0u));
 }

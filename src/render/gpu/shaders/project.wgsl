@@ -1,8 +1,8 @@
 // Every vertex as every camera sees it.
 @compute @workgroup_size(64)
-fn project(@builtin(global_invocation_id) id: vec3<u32>) {
+fn project(@builtin(global_invocation_id) id: vec3<u32>, @builtin(workgroup_id) group: vec3<u32>) {
     let vertex = id.x;
-    let view = id.y;
+    let view = group.y;
     if vertex >= batch.vertices {
         return;
     }

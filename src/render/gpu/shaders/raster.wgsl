@@ -5,7 +5,7 @@ struct Seen {
     @location(0) @interpolate(flat) id: u32,
 }
 
-@group(0) @binding(19) var<storage, read> drawn: array<vec4<f32>>;
+@group(0) @binding(23) var<storage, read> drawn: array<vec4<f32>>;
 
 @vertex
 fn place(@builtin(vertex_index) index: u32, @builtin(instance_index) view: u32) -> Seen {

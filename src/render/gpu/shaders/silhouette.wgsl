@@ -1,11 +1,14 @@
 // Where the edges between what is seen and what is not cross the lines between neighbouring pixels' centres: for each edge
-// and view. Of several edges on one line the one that is farthest out is marked: a greatest integer, in any order.
+// and view. Of several edges on one line the one that is farthest out is marked: a greatest integer, in any order. Marks
+// and counts are zero before.
 
 @group(0) @binding(13) var<storage, read_write> greatest: array<atomic<u32>>;
+@group(0) @binding(20) var<storage, read_write> listed: array<u32>;
+@group(0) @binding(21) var<storage, read_write> count: array<atomic<u32>, 4>;
 
 @compute @workgroup_size(64)
-fn silhouette(@builtin(global_invocation_id) id: vec3<u32>) {
-    let view = id.y;
+fn silhouette(@builtin(global_invocation_id) id: vec3<u32>, @builtin(workgroup_id) group: vec3<u32>) {
+    let view = group.y;
     if id.x >= batch.edges {
         return;
     }
@@ -15,10 +18,23 @@ fn silhouette(@builtin(global_invocation_id) id: vec3<u32>) {
     }
     let size = views[view].size;
     let lines = lines_of(s, size);
+    var seen = false;
     for (var line = lines.x; line < lines.y; line++) {
         let c = crossing_of(s, line, size);
         if c.found && is_seen(view, s, c) {
             atomicMax(&greatest[2u * (views[view].pixels + c.first) + s.axis], mark_of(s, c));
+            seen = true;
+        }
+    }
+    if seen {
+        let at = atomicAdd(&count[3], 1u);
+        listed[at] = view * batch.edges + id.x;
+        if at % 64u == 0u {
+            atomicAdd(&count[0], 1u);
+        }
+        if at == 0u {
+            atomicStore(&count[1], 1u);
+            atomicStore(&count[2], 1u);
         }
     }
 }
