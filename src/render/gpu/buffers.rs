@@ -2,7 +2,7 @@ use wgpu::BufferUsages;
 use wgpu::util::DeviceExt;
 
 use super::chunk::Room;
-use super::kernels::{DEPTH, IDS};
+use super::kernels::{COLOURS, DEPTH, IDS};
 use super::layout::{BatchUniform, Binding, EDGE_GRADIENT, ROW, TRIANGLE_GRADIENT, ViewUniform};
 use crate::mesh::Rows;
 use crate::render::Target;
@@ -35,9 +35,10 @@ pub struct Buffers {
     result: wgpu::Buffer,
     /// What is read back.
     pub read: wgpu::Buffer,
-    /// A layer for each view.
-    pub seen: wgpu::Texture,
-    pub layers: Vec<wgpu::TextureView>,
+    /// What pixels see, and its colours: a layer for each view.
+    pub drawn: [wgpu::Texture; 2],
+    /// Each view's layers of these.
+    pub layers: Vec<[wgpu::TextureView; 2]>,
     pub depth: wgpu::TextureView,
 }
 
@@ -60,14 +61,13 @@ impl Buffers {
         let output = BufferUsages::STORAGE | BufferUsages::COPY_SRC | BufferUsages::COPY_DST;
         let numbers = |bytes: usize| bytes as u64 / 4;
         let results = 9 * vertices + u64::from(ROW) * room.views;
-        let [seen, depth] = [(IDS, room.views as u32), (DEPTH, 1)].map(|(format, layers)| {
-            let read =
-                if format == IDS { wgpu::TextureUsages::COPY_SRC } else { wgpu::TextureUsages::empty() };
-            texture(device, room.size, layers, format, read)
-        });
+        let layers = room.views as u32;
+        let drawn = [IDS, COLOURS]
+            .map(|format| texture(device, room.size, layers, format, wgpu::TextureUsages::COPY_SRC));
+        let depth = texture(device, room.size, 1, DEPTH, wgpu::TextureUsages::empty());
         Self {
             batch: empty(BufferUsages::UNIFORM | BufferUsages::COPY_DST, numbers(size_of::<BatchUniform>())),
-            views: empty(input, room.views * numbers(size_of::<ViewUniform>())),
+            views: empty(input | BufferUsages::UNIFORM, room.views * numbers(size_of::<ViewUniform>())),
             positions: empty(input, 4 * vertices),
             normals: empty(input, 4 * vertices),
             albedo: empty(input, 4 * vertices),
@@ -76,8 +76,8 @@ impl Buffers {
             corner_rows: filled(&flat(&mesh.corners)),
             end_rows: filled(&flat(&mesh.ends)),
             corners: empty(inner, 4 * vertices * room.views),
-            ids: empty(output, room.ids),
-            colours: empty(inner, 4 * room.pixels),
+            ids: empty(output, room.pixels),
+            colours: empty(output, 4 * room.pixels),
             marks: empty(output, 2 * room.pixels),
             pulled: empty(inner, 4 * room.pixels),
             blends: empty(inner, 4 * room.pixels),
@@ -89,9 +89,11 @@ impl Buffers {
             silhouette_count: empty(output | BufferUsages::INDIRECT, 4),
             result: empty(output, results),
             read: empty(BufferUsages::MAP_READ | BufferUsages::COPY_DST, results),
-            layers: (0..room.views as u32).map(|layer| single_layer(&seen, layer)).collect(),
+            layers: (0..layers)
+                .map(|layer| drawn.each_ref().map(|texture| single_layer(texture, layer)))
+                .collect(),
             depth: single_layer(&depth, 0),
-            seen,
+            drawn,
         }
     }
 

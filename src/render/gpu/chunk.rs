@@ -1,19 +1,18 @@
 use std::ops::Range;
 
-use super::layout::{EDGE_GRADIENT, STRIP, TRIANGLE_GRADIENT, stride};
+use super::layout::{EDGE_GRADIENT, STRIP, TRIANGLE_GRADIENT, filled_pixels};
 use crate::render::connectivity::Connectivity;
 use crate::render::{RenderError, Target, View};
 
 /// Pixels that are worked on at once at most, where one picture alone has fewer: hundreds of megabytes.
-const MOST_PIXELS: u64 = 1 << 23;
+const MOST_PIXELS: u64 = 1 << 22;
 
 /// What a number of views takes.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Room {
     pub views: u64,
+    /// With what fills up their rows.
     pub pixels: u64,
-    /// Ids with what fills up their rows.
-    pub ids: u64,
     /// Of the largest width and the largest height.
     pub size: [u32; 2],
     /// Most strips in a view.
@@ -27,8 +26,7 @@ impl Room {
         let [width, height] = view.intrinsics.size;
         Self {
             views: self.views + 1,
-            pixels: self.pixels + view.pixels() as u64,
-            ids: self.ids + u64::from(stride(view)) * u64::from(height),
+            pixels: self.pixels + filled_pixels(view),
             size: [self.size[0].max(width), self.size[1].max(height)],
             strips: self.strips.max(height.div_ceil(STRIP)),
         }
@@ -40,7 +38,6 @@ impl Room {
         Self {
             views: self.views.max(other.views),
             pixels: self.pixels.max(other.pixels),
-            ids: self.ids.max(other.ids),
             size: [0, 1].map(|axis| self.size[axis].max(other.size[axis])),
             strips: self.strips.max(other.strips),
         }
@@ -48,7 +45,7 @@ impl Room {
 
     /// Bytes of the largest buffer of pixels, where none has more than four numbers.
     fn bytes(&self) -> u64 {
-        (16 * self.pixels).max(4 * self.ids)
+        16 * self.pixels
     }
 
     /// Pixels of the textures' layers.

@@ -1,10 +1,13 @@
-use super::layout::Binding;
+use super::layout::{Binding, ViewUniform};
 
 /// What the kernels share, before each of them.
 const COMMON: &str = include_str!("shaders/common.wgsl");
 
 /// Format of what each pixel sees.
 pub const IDS: wgpu::TextureFormat = wgpu::TextureFormat::R32Uint;
+
+/// Format of its colour.
+pub const COLOURS: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Float;
 
 /// Format of how near it is.
 pub const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
@@ -38,13 +41,35 @@ impl<P> Kernel<P> {
     }
 }
 
+impl Kernel<wgpu::RenderPipeline> {
+    /// Each view by itself, ready to be bound.
+    pub fn bind_views(
+        &self,
+        device: &wgpu::Device,
+        views: &wgpu::Buffer,
+        count: u64,
+    ) -> Vec<wgpu::BindGroup> {
+        let layout = self.pipeline.get_bind_group_layout(1);
+        let bytes = size_of::<ViewUniform>() as u64;
+        let bound = |view: u64| {
+            let resource = wgpu::BindingResource::Buffer(wgpu::BufferBinding {
+                buffer: views,
+                offset: view * bytes,
+                size: wgpu::BufferSize::new(bytes),
+            });
+            let entries = &[wgpu::BindGroupEntry { binding: 0, resource }];
+            device.create_bind_group(&wgpu::BindGroupDescriptor { label: None, layout: &layout, entries })
+        };
+        (0..count).map(bound).collect()
+    }
+}
+
 /// Every kernel, compiled.
 #[derive(Debug)]
 pub struct Kernels {
     pub project: Kernel<wgpu::ComputePipeline>,
     /// With all triangles, and with those alone whose outside is seen.
     pub raster: [Kernel<wgpu::RenderPipeline>; 2],
-    pub shade: Kernel<wgpu::ComputePipeline>,
     pub silhouette: Kernel<wgpu::ComputePipeline>,
     pub loss: Kernel<wgpu::ComputePipeline>,
     pub blend: Kernel<wgpu::ComputePipeline>,
@@ -68,11 +93,6 @@ impl Kernels {
         Self {
             project: kernel!(device, "project", [Batch, Views, Positions, Corners]),
             raster: [None, Some(wgpu::Face::Back)].map(|culled| raster(device, culled)),
-            shade: kernel!(
-                device,
-                "shade",
-                [Batch, Views, Normals, Albedo, Triangles, Corners, Ids, Colours]
-            ),
             silhouette: kernel!(
                 device,
                 "silhouette",
@@ -96,7 +116,7 @@ impl Kernels {
                     SilhouetteCount
                 ]
             ),
-            picture: kernel!(device, "picture", [Batch, Views, Edges, Corners, Ids, Colours, Marks, Blends]),
+            picture: kernel!(device, "picture", [Batch, Views, Edges, Corners, Colours, Marks, Blends]),
             silhouette_backward: kernel!(
                 device,
                 "silhouette_backward",
@@ -176,23 +196,19 @@ fn raster(device: &wgpu::Device, culled: Option<wgpu::Face>) -> Kernel<wgpu::Ren
         multisample: Default::default(),
         fragment: Some(wgpu::FragmentState {
             module: &module,
-            entry_point: Some("number"),
+            entry_point: Some("shade"),
             compilation_options: options(),
-            targets: &[Some(wgpu::ColorTargetState {
-                format: IDS,
-                blend: None,
-                write_mask: wgpu::ColorWrites::ALL,
-            })],
+            targets: &[IDS, COLOURS].map(|format| {
+                Some(wgpu::ColorTargetState { format, blend: None, write_mask: wgpu::ColorWrites::ALL })
+            }),
         }),
         multiview_mask: None,
         cache: None,
     });
     let layout = pipeline.get_bind_group_layout(0);
-    Kernel {
-        pipeline,
-        layout,
-        bindings: &[Binding::Batch, Binding::Views, Binding::Triangles, Binding::Drawn],
-    }
+    const BINDINGS: &[Binding] =
+        &[Binding::Batch, Binding::Normals, Binding::Albedo, Binding::Triangles, Binding::Drawn];
+    Kernel { pipeline, layout, bindings: BINDINGS }
 }
 
 fn options() -> wgpu::PipelineCompilationOptions<'static> {

@@ -66,15 +66,14 @@ pub struct ViewUniform {
     background: [f32; 4],
     size: [u32; 2],
     stride: u32,
-    ids: u32,
     pixels: u32,
     target_pixels: u32,
-    padding: [u32; 2],
+    padding: [u32; 7],
 }
 
 impl ViewUniform {
-    /// A view that begins at places among the ids, the pixels and the targets' pixels.
-    pub fn new(view: &View, light: &Light, background: [f32; 3], places: Places) -> Self {
+    /// A view that begins at places among pixels, and among the targets' pixels.
+    pub fn new(view: &View, light: &Light, background: [f32; 3], pixels: u32, target_pixels: u32) -> Self {
         let filled = |[r, g, b]: [f32; 3]| [r, g, b, 0.0];
         Self {
             rows: view.projection(),
@@ -82,23 +81,19 @@ impl ViewUniform {
             background: filled(background),
             size: view.intrinsics.size,
             stride: stride(view),
-            ids: places.ids,
-            pixels: places.pixels,
-            target_pixels: places.target_pixels,
-            padding: [0; 2],
+            pixels,
+            target_pixels,
+            padding: [0; 7],
         }
     }
 }
 
-/// Where a view begins.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct Places {
-    pub ids: u32,
-    pub pixels: u32,
-    pub target_pixels: u32,
-}
-
-/// Ids in a row of a view: textures are copied to rows of 256 bytes.
+/// Pixels in a row of a view with what fills it up: textures are copied to rows of 256 bytes, and ids have four.
 pub fn stride(view: &View) -> u32 {
     view.intrinsics.size[0].next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT / 4)
+}
+
+/// Pixels of a view with what fills up its rows.
+pub fn filled_pixels(view: &View) -> u64 {
+    u64::from(stride(view)) * u64::from(view.intrinsics.size[1])
 }

@@ -20,7 +20,7 @@ use glam::Vec3A;
 
 use self::device::Device;
 use self::kernels::Kernels;
-use self::layout::{Binding, ROW};
+use self::layout::{Binding, ROW, filled_pixels, stride};
 use self::passes::{Loaded, Pass};
 use super::connectivity::Connectivity;
 use super::{
@@ -127,7 +127,7 @@ impl Gpu {
             }
         }
         let view = &targets[target].view;
-        let numbers = 4 * view.pixels();
+        let numbers = 4 * filled_pixels(view) as usize;
         let usage = wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST;
         let read = buffers::buffer(&device.device, usage, numbers as u64);
         let picture = loaded.buffers.get(Binding::Blends, &read);
@@ -135,11 +135,11 @@ impl Gpu {
         device.queue.submit([encoder.finish()]);
         let picture = device.read(&read, numbers)?;
         let (pixels, _) = picture.as_chunks::<4>();
-        Ok(Rendering {
-            size: view.size(),
-            colours: pixels.iter().map(|&[r, g, b, _]| [r, g, b]).collect(),
-            covered: pixels.iter().map(|pixel| pixel[3] != 0.0).collect(),
-        })
+        let (size, stride) = (view.size(), stride(view) as usize);
+        let (colours, covered) = (pixels.chunks_exact(stride).flat_map(|row| &row[..size[0]]))
+            .map(|&[r, g, b, covered]| ([r, g, b], covered != 0.0))
+            .unzip();
+        Ok(Rendering { size, colours, covered })
     }
 }
 

@@ -2,7 +2,7 @@ use super::buffers::{Buffers, upload_targets};
 use super::chunk::{Room, chunks};
 use super::device::Device;
 use super::kernels::{Kernel, Kernels};
-use super::layout::{BatchUniform, Binding, Places, ROW, STRIP, ViewUniform, stride};
+use super::layout::{BatchUniform, Binding, ROW, STRIP, ViewUniform, stride};
 use crate::render::connectivity::Connectivity;
 use crate::render::{RenderError, Surface, Target};
 
@@ -11,7 +11,6 @@ use crate::render::{RenderError, Surface, Target};
 pub enum Pass {
     Project,
     Raster,
-    Shade,
     Silhouette,
     Loss,
     Blend,
@@ -24,10 +23,9 @@ pub enum Pass {
 
 impl Pass {
     /// What gives a loss and its gradient.
-    pub const LOSS: [Self; 10] = [
+    pub const LOSS: [Self; 9] = [
         Self::Project,
         Self::Raster,
-        Self::Shade,
         Self::Silhouette,
         Self::Loss,
         Self::Blend,
@@ -38,15 +36,13 @@ impl Pass {
     ];
 
     /// What gives a picture.
-    pub const PICTURE: [Self; 5] =
-        [Self::Project, Self::Raster, Self::Shade, Self::Silhouette, Self::Picture];
+    pub const PICTURE: [Self; 4] = [Self::Project, Self::Raster, Self::Silhouette, Self::Picture];
 
     /// Its file's name.
     pub fn name(self) -> &'static str {
         match self {
             Self::Project => "project",
             Self::Raster => "raster",
-            Self::Shade => "shade",
             Self::Silhouette => "silhouette",
             Self::Loss => "loss",
             Self::Blend => "blend",
@@ -66,6 +62,8 @@ pub struct Loaded {
     /// What the buffers have room for.
     pub room: Room,
     chunks: Vec<Chunk>,
+    /// Each view by itself, for the raster.
+    views: Vec<wgpu::BindGroup>,
     counts: BatchUniform,
 }
 
@@ -85,7 +83,7 @@ struct Chunk {
     /// Where each begins among the pixels of the run.
     begins: Vec<u32>,
     /// For each pass.
-    groups: [wgpu::BindGroup; 11],
+    groups: [wgpu::BindGroup; 10],
 }
 
 /// Views that are worked on at once.
@@ -94,10 +92,19 @@ pub struct Batch {
     chunk: usize,
     uniform: BatchUniform,
     views: Vec<ViewUniform>,
-    places: Vec<Places>,
-    /// Width and height of each view, and ids in its rows.
-    sizes: Vec<[u32; 3]>,
+    pictures: Vec<Picture>,
     room: Room,
+}
+
+/// Where a view is drawn, and copied to.
+#[derive(Debug, Clone, Copy)]
+struct Picture {
+    size: [u32; 2],
+    background: [f32; 3],
+    /// Pixels in a row with what fills it up.
+    stride: u32,
+    /// Its first one's place.
+    pixels: u64,
 }
 
 impl Loaded {
@@ -127,8 +134,13 @@ impl Loaded {
             strips: room.strips,
             ..Default::default()
         };
+        let views = kernels.raster[usize::from(mesh.closed)].bind_views(
+            &device.device,
+            buffers.get(Binding::Views, &buffers.read),
+            room.views,
+        );
         device.check()?;
-        Ok(Self { buffers, room, chunks, counts })
+        Ok(Self { buffers, room, chunks, views, counts })
     }
 
     /// Cuts listed targets into batches of one run each.
@@ -140,9 +152,7 @@ impl Loaded {
                 let view = &targets[index].view;
                 let fits = |batch: &Batch| {
                     let more = batch.room.with(view);
-                    more.views <= self.room.views
-                        && more.pixels <= self.room.pixels
-                        && more.ids <= self.room.ids
+                    more.views <= self.room.views && more.pixels <= self.room.pixels
                 };
                 if batches.len() == first || !batches.last().is_some_and(fits) {
                     let uniform = BatchUniform { with_albedo: with_albedo.into(), scale, ..self.counts };
@@ -189,7 +199,6 @@ impl Loaded {
         let groups = |threads: u32| threads.div_ceil(64);
         let (kernel, threads) = match pass {
             Pass::Project => (&kernels.project, Threads::Groups([groups(vertices), views, 1])),
-            Pass::Shade => (&kernels.shade, Threads::Groups([columns, rows, views])),
             Pass::Silhouette => (&kernels.silhouette, Threads::Groups([groups(edges), views, 1])),
             Pass::Loss => (&kernels.loss, Threads::Groups([1, rows.div_ceil(STRIP), views])),
             Pass::Blend => (&kernels.blend, Threads::OfSilhouettes),
@@ -219,21 +228,22 @@ impl Loaded {
     }
 
     fn encode_raster(&self, kernels: &Kernels, batch: &Batch, encoder: &mut wgpu::CommandEncoder) {
-        let Buffers { layers, depth, seen, .. } = &self.buffers;
-        let pipeline = &kernels.raster[self.counts.closed as usize].pipeline;
-        for ((view, layer), &[width, height, _]) in (0..).zip(layers).zip(&batch.sizes) {
+        let kernel = &kernels.raster[self.counts.closed as usize];
+        let group = &self.chunks[batch.chunk].groups[Pass::Raster as usize];
+        for (view, &Picture { size: [width, height], background, .. }) in (0..).zip(&batch.pictures) {
+            let [seen, colours] = &self.buffers.layers[view as usize];
+            let attached = |view, clear| {
+                let ops = wgpu::Operations { load: wgpu::LoadOp::Clear(clear), store: wgpu::StoreOp::Store };
+                Some(wgpu::RenderPassColorAttachment { view, depth_slice: None, resolve_target: None, ops })
+            };
+            let [r, g, b] = background.map(f64::from);
             let mut recorded = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-                color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-                    view: layer,
-                    depth_slice: None,
-                    resolve_target: None,
-                    ops: wgpu::Operations {
-                        load: wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT),
-                        store: wgpu::StoreOp::Store,
-                    },
-                })],
+                color_attachments: &[
+                    attached(seen, wgpu::Color::TRANSPARENT),
+                    attached(colours, wgpu::Color { r, g, b, a: 0.0 }),
+                ],
                 depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
-                    view: depth,
+                    view: &self.buffers.depth,
                     depth_ops: Some(wgpu::Operations {
                         load: wgpu::LoadOp::Clear(0.0),
                         store: wgpu::StoreOp::Discard,
@@ -244,21 +254,35 @@ impl Loaded {
             });
             recorded.set_viewport(0.0, 0.0, width as f32, height as f32, 0.0, 1.0);
             recorded.set_scissor_rect(0, 0, width, height);
-            recorded.set_pipeline(pipeline);
-            recorded.set_bind_group(0, &self.chunks[batch.chunk].groups[Pass::Raster as usize], &[]);
+            recorded.set_pipeline(&kernel.pipeline);
+            recorded.set_bind_group(0, group, &[]);
+            recorded.set_bind_group(1, &self.views[view as usize], &[]);
             recorded.draw(0..3 * self.counts.triangles, view..view + 1);
         }
-        let ids = self.buffers.get(Binding::Ids, &self.buffers.read);
-        for ((layer, places), &[width, height, stride]) in (0..).zip(&batch.places).zip(&batch.sizes) {
-            let mut from = seen.as_image_copy();
+        for (binding, texture) in [Binding::Ids, Binding::Colours].into_iter().zip(&self.buffers.drawn) {
+            self.copy_drawn(batch, texture, self.buffers.get(binding, &self.buffers.read), encoder);
+        }
+    }
+
+    /// Records copies of what was drawn into a buffer of pixels.
+    fn copy_drawn(
+        &self,
+        batch: &Batch,
+        texture: &wgpu::Texture,
+        buffer: &wgpu::Buffer,
+        encoder: &mut wgpu::CommandEncoder,
+    ) {
+        let bytes = texture.format().block_copy_size(None).unwrap_or(4);
+        for (layer, &Picture { size: [width, height], stride, pixels, .. }) in (0..).zip(&batch.pictures) {
+            let mut from = texture.as_image_copy();
             from.origin.z = layer;
             let layout = wgpu::TexelCopyBufferLayout {
-                offset: 4 * u64::from(places.ids),
-                bytes_per_row: Some(4 * stride),
+                offset: u64::from(bytes) * pixels,
+                bytes_per_row: Some(bytes * stride),
                 rows_per_image: None,
             };
             let size = wgpu::Extent3d { width, height, depth_or_array_layers: 1 };
-            encoder.copy_texture_to_buffer(from, wgpu::TexelCopyBufferInfo { buffer: ids, layout }, size);
+            encoder.copy_texture_to_buffer(from, wgpu::TexelCopyBufferInfo { buffer, layout }, size);
         }
     }
 }
@@ -285,7 +309,6 @@ impl Chunk {
         let groups = [
             bound(&kernels.project),
             kernels.raster[usize::from(mesh.closed)].bind(device, buffer),
-            bound(&kernels.shade),
             bound(&kernels.silhouette),
             bound(&kernels.loss),
             bound(&kernels.blend),
@@ -301,18 +324,15 @@ impl Chunk {
 
 impl Batch {
     fn new(chunk: usize, uniform: BatchUniform) -> Self {
-        let (views, places, sizes) = (Vec::new(), Vec::new(), Vec::new());
-        Self { chunk, uniform, views, places, sizes, room: Room::default() }
+        Self { chunk, uniform, views: Vec::new(), pictures: Vec::new(), room: Room::default() }
     }
 
     fn push(&mut self, target: &Target, target_pixels: u32) {
         let Target { view, light, background, .. } = target;
-        let pixels = self.room.pixels as u32;
-        let places = Places { ids: self.room.ids as u32, pixels, target_pixels };
-        self.views.push(ViewUniform::new(view, light, *background, places));
-        self.places.push(places);
-        let [width, height] = view.intrinsics.size;
-        self.sizes.push([width, height, stride(view)]);
+        let pixels = self.room.pixels;
+        self.views.push(ViewUniform::new(view, light, *background, pixels as u32, target_pixels));
+        let size = view.intrinsics.size;
+        self.pictures.push(Picture { size, background: *background, stride: stride(view), pixels });
         self.room = self.room.with(view);
         self.uniform.views += 1;
     }

@@ -34,7 +34,6 @@ fn backward(@builtin(global_invocation_id) id: vec3<u32>, @builtin(workgroup_id)
     }
     let light = views[view].light;
     let start = views[view].pixels;
-    let ids_start = views[view].ids;
     let stride = views[view].stride;
     let h0 = seen_from(c0, low);
     let h1 = seen_from(c1, low);
@@ -56,12 +55,12 @@ fn backward(@builtin(global_invocation_id) id: vec3<u32>, @builtin(workgroup_id)
         let first = vec2<u32>(low);
         let last = vec2<u32>(high);
         for (var y = first.y; y <= last.y; y++) {
-            let row = ids_start + y * stride;
+            let row = start + y * stride;
             for (var x = first.x; x <= last.x; x++) {
                 if ids[row + x] != triangle + 1u {
                     continue;
                 }
-                let pull = pulled[start + y * size.x + x].xyz;
+                let pull = pulled[row + x].xyz;
                 let spot = vec3<f32>(f32(x) - low.x, f32(y) - low.y, 1.0);
                 let a = vec3<f32>(dot(plane0, spot), dot(plane1, spot), dot(plane2, spot));
                 let inverse_sum = inverse_of(a.x + a.y + a.z);

@@ -21,13 +21,12 @@ struct View {
     light: array<vec4<f32>, 9>,
     background: vec4<f32>,
     size: vec2<u32>,
-    // Ids in a row, with what fills it up.
+    // Pixels in a row, with what fills it up.
     stride: u32,
-    // Where this view begins among ids, among pixels and among the targets' pixels.
-    ids: u32,
+    // Where this view begins among pixels, and among the targets' pixels, whose rows are not filled up.
     pixels: u32,
     target_pixels: u32,
-    padding: vec2<u32>,
+    padding: vec3<u32>,
 }
 
 const NEAR: f32 = 1e-6;
@@ -52,7 +51,7 @@ const STRIP: u32 = 16u;
 // (u w, v w, w, 1 / w), the last zero for what is not before the camera.
 @group(0) @binding(10) var<storage, read_write> corners: array<vec4<f32>>;
 @group(0) @binding(11) var<storage, read> ids: array<u32>;
-@group(0) @binding(12) var<storage, read_write> colours: array<vec4<f32>>;
+@group(0) @binding(12) var<storage, read> colours: array<vec4<f32>>;
 @group(0) @binding(13) var<storage, read_write> marks: array<u32>;
 // The gradient with respect to the colours.
 @group(0) @binding(14) var<storage, read_write> pulled: array<vec4<f32>>;
@@ -169,13 +168,13 @@ fn lines_of(s: Silhouette, size: vec2<u32>) -> vec2<u32> {
     return vec2<u32>(u32(low), u32(high));
 }
 
-fn crossing_of(s: Silhouette, line: u32, size: vec2<u32>) -> Crossing {
+fn crossing_of(s: Silhouette, line: u32, size: vec2<u32>, stride: u32) -> Crossing {
     var c: Crossing;
     c.along = (f32(line) - s.a.y) / (s.b.y - s.a.y);
     let at = s.a.x + (s.b.x - s.a.x) * c.along;
     let before = floor(at);
     c.found = before >= 0.0 && before + 1.0 < f32(select(size.x, size.y, s.axis == 1u));
-    let step = select(vec2<u32>(1u, size.x), vec2<u32>(size.x, 1u), s.axis == 1u);
+    let step = select(vec2<u32>(1u, stride), vec2<u32>(stride, 1u), s.axis == 1u);
     c.first = u32(max(before, 0.0)) * step.x + line * step.y;
     c.second = c.first + step.x;
     c.place = at - before;
@@ -191,7 +190,7 @@ fn mark_of(s: Silhouette, c: Crossing) -> u32 {
 fn place_of(view: u32, mark: u32, axis: u32, pixel: vec2<u32>) -> f32 {
     let s = silhouette_of(view, (mark & 0xffffffu) - 1u);
     let line = select(pixel.y, pixel.x, axis == 1u);
-    return crossing_of(s, line, views[view].size).place;
+    return crossing_of(s, line, views[view].size, views[view].stride).place;
 }
 
 // Whether a mark is the first of its pixel's four, in whose name the pixel is worked on: 0 to 3 for those on the right, below,
@@ -204,14 +203,14 @@ fn is_first(view: u32, pixel: vec2<u32>, side: u32) -> bool {
 
 // Marks on a pixel's right, below it, on its left and above.
 fn marks_of(view: u32, pixel: vec2<u32>) -> vec4<u32> {
-    let width = views[view].size.x;
-    let at = 2u * (views[view].pixels + pixel.y * width + pixel.x);
+    let stride = views[view].stride;
+    let at = 2u * (views[view].pixels + pixel.y * stride + pixel.x);
     var all = vec4<u32>(marks[at], marks[at + 1u], 0u, 0u);
     if pixel.x > 0u {
         all.z = marks[at - 2u];
     }
     if pixel.y > 0u {
-        all.w = marks[at - 2u * width + 1u];
+        all.w = marks[at - 2u * stride + 1u];
     }
     return all;
 }
@@ -232,8 +231,8 @@ fn shares_of(view: u32, pixel: vec2<u32>) -> vec4<f32> {
 }
 
 fn blended(view: u32, pixel: vec2<u32>) -> vec3<f32> {
-    let width = views[view].size.x;
-    let at = views[view].pixels + pixel.y * width + pixel.x;
+    let stride = views[view].stride;
+    let at = views[view].pixels + pixel.y * stride + pixel.x;
     let own = colours[at].xyz;
     let shares = shares_of(view, pixel);
     var colour = own;
@@ -241,13 +240,13 @@ fn blended(view: u32, pixel: vec2<u32>) -> vec3<f32> {
         colour += (colours[at + 1u].xyz - own) * shares.x;
     }
     if shares.y > 0.0 {
-        colour += (colours[at + width].xyz - own) * shares.y;
+        colour += (colours[at + stride].xyz - own) * shares.y;
     }
     if shares.z > 0.0 {
         colour += (colours[at - 1u].xyz - own) * shares.z;
     }
     if shares.w > 0.0 {
-        colour += (colours[at - width].xyz - own) * shares.w;
+        colour += (colours[at - stride].xyz - own) * shares.w;
     }
     return colour;
 }

@@ -9,15 +9,16 @@ fn loss(@builtin(global_invocation_id) id: vec3<u32>, @builtin(workgroup_id) gro
         return;
     }
     let start = views[view].pixels;
+    let stride = views[view].stride;
     let wanted_start = views[view].target_pixels;
     var sum = 0.0;
     let end = min(first + STRIP, size.y);
     for (var y = first; y < end; y++) {
         for (var x = id.x; x < size.x; x += ROW) {
-            let place = y * size.x + x;
-            let wanted = targets[wanted_start + place];
-            let difference = colours[start + place].xyz - wanted.xyz;
-            pulled[start + place] = vec4<f32>(sign(difference) * (wanted.w * batch.scale), 0.0);
+            let at = start + y * stride + x;
+            let wanted = targets[wanted_start + y * size.x + x];
+            let difference = colours[at].xyz - wanted.xyz;
+            pulled[at] = vec4<f32>(sign(difference) * (wanted.w * batch.scale), 0.0);
             let apart = abs(difference);
             sum += (apart.x + apart.y + apart.z) * wanted.w;
         }

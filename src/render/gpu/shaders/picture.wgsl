@@ -7,7 +7,6 @@ fn picture(@builtin(global_invocation_id) id: vec3<u32>, @builtin(workgroup_id) 
     if id.x >= size.x || y >= size.y {
         return;
     }
-    let seen = ids[views[view].ids + y * views[view].stride + id.x];
-    let at = views[view].pixels + y * size.x + id.x;
-    blends[at] = vec4<f32>(blended(view, vec2<u32>(id.x, y)), select(1.0, 0.0, seen == 0u));
+    let at = views[view].pixels + y * views[view].stride + id.x;
+    blends[at] = vec4<f32>(blended(view, vec2<u32>(id.x, y)), colours[at].w);
 }

@@ -1,16 +1,25 @@
-// Which triangle each pixel's centre sees: one more than its index, 0 for none. Drawn once for each view.
+// Which triangle each pixel's centre sees, one more than its index, 0 for none; and its colour. Drawn once for each view.
 
 struct Seen {
     @builtin(position) place: vec4<f32>,
     @location(0) @interpolate(flat) id: u32,
+    @location(1) normal: vec3<f32>,
+    @location(2) albedo: vec3<f32>,
+}
+
+struct Shown {
+    @location(0) id: u32,
+    @location(1) colour: vec4<f32>,
 }
 
 @group(0) @binding(23) var<storage, read> drawn: array<vec4<f32>>;
+@group(1) @binding(0) var<uniform> shown_view: View;
 
 @vertex
 fn place(@builtin(vertex_index) index: u32, @builtin(instance_index) view: u32) -> Seen {
-    let corner = drawn[view * batch.vertices + triangles[index]];
-    let size = vec2<f32>(views[view].size);
+    let vertex = triangles[index];
+    let corner = drawn[view * batch.vertices + vertex];
+    let size = vec2<f32>(shown_view.size);
     var seen: Seen;
     // Depth is NEAR / w: the larger is the nearer.
     seen.place = vec4<f32>(
@@ -20,10 +29,16 @@ fn place(@builtin(vertex_index) index: u32, @builtin(instance_index) view: u32) 
         corner.z,
     );
     seen.id = index / 3u + 1u;
+    seen.normal = normals[vertex].xyz;
+    seen.albedo = vec3<f32>(1.0);
+    if batch.with_albedo != 0u {
+        seen.albedo = albedo[vertex].xyz;
+    }
     return seen;
 }
 
 @fragment
-fn number(seen: Seen) -> @location(0) u32 {
-    return seen.id;
+fn shade(seen: Seen) -> Shown {
+    let normal = seen.normal / max(length(seen.normal), LEAST_NORMAL);
+    return Shown(seen.id, vec4<f32>(light_colour(shown_view.light, normal) * seen.albedo, 1.0));
 }

@@ -17,10 +17,11 @@ fn silhouette(@builtin(global_invocation_id) id: vec3<u32>, @builtin(workgroup_i
         return;
     }
     let size = views[view].size;
+    let stride = views[view].stride;
     let lines = lines_of(s, size);
     var seen = false;
     for (var line = lines.x; line < lines.y; line++) {
-        let c = crossing_of(s, line, size);
+        let c = crossing_of(s, line, size, stride);
         if c.found && is_seen(view, s, c) {
             atomicMax(&greatest[2u * (views[view].pixels + c.first) + s.axis], mark_of(s, c));
             seen = true;
@@ -50,14 +51,13 @@ fn is_seen(view: u32, s: Silhouette, c: Crossing) -> bool {
 }
 
 fn id_at(view: u32, place: u32) -> u32 {
-    let width = views[view].size.x;
-    return ids[views[view].ids + (place / width) * views[view].stride + place % width];
+    return ids[views[view].pixels + place];
 }
 
 // 1 / w of a triangle at a pixel's centre: linear on the picture.
 fn nearness(view: u32, id: u32, place: u32) -> f32 {
-    let width = views[view].size.x;
-    let at = vec2<f32>(f32(place % width), f32(place / width)) + 0.5;
+    let stride = views[view].stride;
+    let at = vec2<f32>(f32(place % stride), f32(place / stride)) + 0.5;
     let a = corner(view, triangles[3u * id - 3u]);
     let b = corner(view, triangles[3u * id - 2u]);
     let c = corner(view, triangles[3u * id - 1u]);

@@ -8,12 +8,13 @@ fn silhouette_backward(@builtin(global_invocation_id) id: vec3<u32>) {
     let view = at / batch.edges;
     let s = silhouette_of(view, at % batch.edges);
     let size = views[view].size;
+    let stride = views[view].stride;
     let start = views[view].pixels;
     // Sum of dE / d place, and of the same times the share of the way along.
     var sum = vec2<f32>(0.0);
     let lines = lines_of(s, size);
     for (var line = lines.x; line < lines.y; line++) {
-        let c = crossing_of(s, line, size);
+        let c = crossing_of(s, line, size, stride);
         if c.found && marks[2u * (start + c.first) + s.axis] == mark_of(s, c) {
             let crossed = select(c.second, c.first, c.place < 0.5);
             let across = colours[start + c.first].xyz - colours[start + c.second].xyz;
@@ -21,10 +22,10 @@ fn silhouette_backward(@builtin(global_invocation_id) id: vec3<u32>) {
         }
     }
     for (var i = 2u * lines.x; i < 2u * lines.y; i++) {
-        let c = crossing_of(s, i / 2u, size);
+        let c = crossing_of(s, i / 2u, size, stride);
         if c.found && marks[2u * (start + c.first) + s.axis] == mark_of(s, c) {
             let place = select(c.first, c.second, i % 2u == 1u);
-            let pixel = vec2<u32>(place % size.x, place / size.x);
+            let pixel = vec2<u32>(place % stride, place / stride);
             if is_first(view, pixel, s.axis + 2u * (i % 2u)) {
                 pulled[start + place] = vec4<f32>(unblended(view, pixel), 0.0);
             }
@@ -48,8 +49,8 @@ fn end_gradient(view: u32, corner: vec4<f32>, axis: u32, across: f32, slope: f32
 
 // The gradient with respect to a pixel's colour before it was blended.
 fn unblended(view: u32, pixel: vec2<u32>) -> vec3<f32> {
-    let width = views[view].size.x;
-    let at = views[view].pixels + pixel.y * width + pixel.x;
+    let stride = views[view].stride;
+    let at = views[view].pixels + pixel.y * stride + pixel.x;
     let own = blends[at].xyz;
     let shares = shares_of(view, pixel);
     let taken = max(shares, vec4<f32>(0.0));
@@ -58,13 +59,13 @@ fn unblended(view: u32, pixel: vec2<u32>) -> vec3<f32> {
         pull -= blends[at + 1u].xyz * shares.x;
     }
     if shares.y < 0.0 {
-        pull -= blends[at + width].xyz * shares.y;
+        pull -= blends[at + stride].xyz * shares.y;
     }
     if shares.z < 0.0 {
         pull -= blends[at - 1u].xyz * shares.z;
     }
     if shares.w < 0.0 {
-        pull -= blends[at - width].xyz * shares.w;
+        pull -= blends[at - stride].xyz * shares.w;
     }
     return pull;
 }
