@@ -2,8 +2,8 @@ use wgpu::BufferUsages;
 use wgpu::util::DeviceExt;
 
 use super::chunk::Room;
-use super::kernels::{COLOURS, DEPTH, IDS};
-use super::layout::{BatchUniform, Binding, EDGE_GRADIENT, ROW, TRIANGLE_GRADIENT, ViewUniform};
+use super::kernels::{COLOURS, DEPTH};
+use super::layout::{BatchUniform, Binding, EDGE_GRADIENT, ROW, Range, TRIANGLE_GRADIENT, ViewUniform};
 use crate::mesh::Rows;
 use crate::render::Target;
 use crate::render::connectivity::Connectivity;
@@ -21,7 +21,6 @@ pub struct Buffers {
     corner_rows: wgpu::Buffer,
     end_rows: wgpu::Buffer,
     corners: wgpu::Buffer,
-    ids: wgpu::Buffer,
     colours: wgpu::Buffer,
     marks: wgpu::Buffer,
     pulled: wgpu::Buffer,
@@ -35,10 +34,9 @@ pub struct Buffers {
     result: wgpu::Buffer,
     /// What is read back.
     pub read: wgpu::Buffer,
-    /// What pixels see, and its colours: a layer for each view.
-    pub drawn: [wgpu::Texture; 2],
-    /// Each view's layers of these.
-    pub layers: Vec<[wgpu::TextureView; 2]>,
+    /// What is drawn: a layer for each view.
+    pub drawn: wgpu::Texture,
+    pub layers: Vec<wgpu::TextureView>,
     pub depth: wgpu::TextureView,
 }
 
@@ -62,8 +60,7 @@ impl Buffers {
         let numbers = |bytes: usize| bytes as u64 / 4;
         let results = 9 * vertices + u64::from(ROW) * room.views;
         let layers = room.views as u32;
-        let drawn = [IDS, COLOURS]
-            .map(|format| texture(device, room.size, layers, format, wgpu::TextureUsages::COPY_SRC));
+        let drawn = texture(device, room.size, layers, COLOURS, wgpu::TextureUsages::COPY_SRC);
         let depth = texture(device, room.size, 1, DEPTH, wgpu::TextureUsages::empty());
         Self {
             batch: empty(BufferUsages::UNIFORM | BufferUsages::COPY_DST, numbers(size_of::<BatchUniform>())),
@@ -76,10 +73,9 @@ impl Buffers {
             corner_rows: filled(&flat(&mesh.corners)),
             end_rows: filled(&flat(&mesh.ends)),
             corners: empty(inner, 4 * vertices * room.views),
-            ids: empty(output, room.pixels),
             colours: empty(output, 4 * room.pixels),
             marks: empty(output, 2 * room.pixels),
-            pulled: empty(inner, 4 * room.pixels),
+            pulled: empty(inner, 3 * room.pixels),
             blends: empty(inner, 4 * room.pixels),
             strip_losses: empty(inner, u64::from(ROW * room.strips) * room.views),
             triangle_gradients: empty(inner, TRIANGLE_GRADIENT * triangles * room.views),
@@ -89,9 +85,7 @@ impl Buffers {
             silhouette_count: empty(output | BufferUsages::INDIRECT, 4),
             result: empty(output, results),
             read: empty(BufferUsages::MAP_READ | BufferUsages::COPY_DST, results),
-            layers: (0..layers)
-                .map(|layer| drawn.each_ref().map(|texture| single_layer(texture, layer)))
-                .collect(),
+            layers: (0..layers).map(|layer| single_layer(&drawn, layer)).collect(),
             depth: single_layer(&depth, 0),
             drawn,
         }
@@ -111,7 +105,6 @@ impl Buffers {
             Binding::EndRows => &self.end_rows,
             Binding::Targets => targets,
             Binding::Corners | Binding::Drawn => &self.corners,
-            Binding::Ids => &self.ids,
             Binding::Colours => &self.colours,
             Binding::Marks => &self.marks,
             Binding::Pulled => &self.pulled,
@@ -130,10 +123,12 @@ impl Buffers {
 /// The colours and weights of a run of targets.
 pub fn upload_targets(device: &wgpu::Device, targets: &[Target]) -> wgpu::Buffer {
     let pixels: usize = targets.iter().map(|target| target.colours.len()).sum();
-    let mut numbers: Vec<[f32; 4]> = Vec::with_capacity(pixels);
+    let mut numbers: Vec<[u32; 2]> = Vec::with_capacity(pixels);
     for target in targets {
+        let range = Range::of(target);
         let weight = |pixel: usize| target.weights.as_ref().map_or(1.0, |weights| weights[pixel]);
-        numbers.extend(target.colours.iter().enumerate().map(|(pixel, &[r, g, b])| [r, g, b, weight(pixel)]));
+        let pixels = target.colours.iter().enumerate();
+        numbers.extend(pixels.map(|(pixel, &colour)| range.packed(colour, weight(pixel))));
     }
     device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
         label: None,

@@ -3,10 +3,7 @@ use super::layout::{Binding, ViewUniform};
 /// What the kernels share, before each of them.
 const COMMON: &str = include_str!("shaders/common.wgsl");
 
-/// Format of what each pixel sees.
-pub const IDS: wgpu::TextureFormat = wgpu::TextureFormat::R32Uint;
-
-/// Format of its colour.
+/// Format of what each pixel sees: its colour, and the triangle.
 pub const COLOURS: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Float;
 
 /// Format of how near it is.
@@ -96,7 +93,7 @@ impl Kernels {
             silhouette: kernel!(
                 device,
                 "silhouette",
-                [Batch, Views, Triangles, Edges, Corners, Ids, Marks, Silhouettes, SilhouetteCount]
+                [Batch, Views, Triangles, Edges, Corners, Colours, Marks, Silhouettes, SilhouetteCount]
             ),
             loss: kernel!(device, "loss", [Batch, Views, Targets, Colours, Pulled, StripLosses]),
             blend: kernel!(
@@ -137,7 +134,7 @@ impl Kernels {
             backward: kernel!(
                 device,
                 "backward",
-                [Batch, Views, Normals, Albedo, Triangles, Corners, Ids, Pulled, TriangleGradients]
+                [Batch, Views, Normals, Albedo, Triangles, Corners, Colours, Pulled, TriangleGradients]
             ),
             gather: kernel!(
                 device,
@@ -198,9 +195,11 @@ fn raster(device: &wgpu::Device, culled: Option<wgpu::Face>) -> Kernel<wgpu::Ren
             module: &module,
             entry_point: Some("shade"),
             compilation_options: options(),
-            targets: &[IDS, COLOURS].map(|format| {
-                Some(wgpu::ColorTargetState { format, blend: None, write_mask: wgpu::ColorWrites::ALL })
-            }),
+            targets: &[Some(wgpu::ColorTargetState {
+                format: COLOURS,
+                blend: None,
+                write_mask: wgpu::ColorWrites::ALL,
+            })],
         }),
         multiview_mask: None,
         cache: None,

@@ -2,7 +2,7 @@ use super::buffers::{Buffers, upload_targets};
 use super::chunk::{Room, chunks};
 use super::device::Device;
 use super::kernels::{Kernel, Kernels};
-use super::layout::{BatchUniform, Binding, ROW, STRIP, ViewUniform, stride};
+use super::layout::{BatchUniform, Binding, ROW, Range, STRIP, ViewUniform, stride};
 use crate::render::connectivity::Connectivity;
 use crate::render::{RenderError, Surface, Target};
 
@@ -82,6 +82,8 @@ struct Chunk {
     targets: std::ops::Range<usize>,
     /// Where each begins among the pixels of the run.
     begins: Vec<u32>,
+    /// What its numbers are between.
+    ranges: Vec<Range>,
     /// For each pass.
     groups: [wgpu::BindGroup; 10],
 }
@@ -146,7 +148,7 @@ impl Loaded {
     /// Cuts listed targets into batches of one run each.
     pub fn batches(&self, listed: &[usize], targets: &[Target], with_albedo: bool, scale: f32) -> Vec<Batch> {
         let mut batches: Vec<Batch> = Vec::new();
-        for (chunk, Chunk { targets: range, begins, .. }) in self.chunks.iter().enumerate() {
+        for (chunk, Chunk { targets: range, begins, ranges, .. }) in self.chunks.iter().enumerate() {
             let first = batches.len();
             for &index in listed.iter().filter(|index| range.contains(index)) {
                 let view = &targets[index].view;
@@ -159,7 +161,8 @@ impl Loaded {
                     batches.push(Batch::new(chunk, uniform));
                 }
                 if let Some(batch) = batches.last_mut() {
-                    batch.push(&targets[index], begins[index - range.start]);
+                    let of_run = index - range.start;
+                    batch.push(&targets[index], ranges[of_run], begins[of_run]);
                 }
             }
         }
@@ -231,17 +234,17 @@ impl Loaded {
         let kernel = &kernels.raster[self.counts.closed as usize];
         let group = &self.chunks[batch.chunk].groups[Pass::Raster as usize];
         for (view, &Picture { size: [width, height], background, .. }) in (0..).zip(&batch.pictures) {
-            let [seen, colours] = &self.buffers.layers[view as usize];
-            let attached = |view, clear| {
-                let ops = wgpu::Operations { load: wgpu::LoadOp::Clear(clear), store: wgpu::StoreOp::Store };
-                Some(wgpu::RenderPassColorAttachment { view, depth_slice: None, resolve_target: None, ops })
-            };
             let [r, g, b] = background.map(f64::from);
             let mut recorded = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-                color_attachments: &[
-                    attached(seen, wgpu::Color::TRANSPARENT),
-                    attached(colours, wgpu::Color { r, g, b, a: 0.0 }),
-                ],
+                color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                    view: &self.buffers.layers[view as usize],
+                    depth_slice: None,
+                    resolve_target: None,
+                    ops: wgpu::Operations {
+                        load: wgpu::LoadOp::Clear(wgpu::Color { r, g, b, a: 0.0 }),
+                        store: wgpu::StoreOp::Store,
+                    },
+                })],
                 depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
                     view: &self.buffers.depth,
                     depth_ops: Some(wgpu::Operations {
@@ -259,26 +262,13 @@ impl Loaded {
             recorded.set_bind_group(1, &self.views[view as usize], &[]);
             recorded.draw(0..3 * self.counts.triangles, view..view + 1);
         }
-        for (binding, texture) in [Binding::Ids, Binding::Colours].into_iter().zip(&self.buffers.drawn) {
-            self.copy_drawn(batch, texture, self.buffers.get(binding, &self.buffers.read), encoder);
-        }
-    }
-
-    /// Records copies of what was drawn into a buffer of pixels.
-    fn copy_drawn(
-        &self,
-        batch: &Batch,
-        texture: &wgpu::Texture,
-        buffer: &wgpu::Buffer,
-        encoder: &mut wgpu::CommandEncoder,
-    ) {
-        let bytes = texture.format().block_copy_size(None).unwrap_or(4);
+        let (texture, buffer) = (&self.buffers.drawn, self.buffers.get(Binding::Colours, &self.buffers.read));
         for (layer, &Picture { size: [width, height], stride, pixels, .. }) in (0..).zip(&batch.pictures) {
             let mut from = texture.as_image_copy();
             from.origin.z = layer;
             let layout = wgpu::TexelCopyBufferLayout {
-                offset: u64::from(bytes) * pixels,
-                bytes_per_row: Some(bytes * stride),
+                offset: 16 * pixels,
+                bytes_per_row: Some(16 * stride),
                 rows_per_image: None,
             };
             let size = wgpu::Extent3d { width, height, depth_or_array_layers: 1 };
@@ -318,7 +308,8 @@ impl Chunk {
             bound(&kernels.total),
             bound(&kernels.picture),
         ];
-        Self { targets: range, begins, groups }
+        let ranges = targets[range.clone()].iter().map(Range::of).collect();
+        Self { targets: range, begins, ranges, groups }
     }
 }
 
@@ -327,10 +318,10 @@ impl Batch {
         Self { chunk, uniform, views: Vec::new(), pictures: Vec::new(), room: Room::default() }
     }
 
-    fn push(&mut self, target: &Target, target_pixels: u32) {
+    fn push(&mut self, target: &Target, range: Range, target_pixels: u32) {
         let Target { view, light, background, .. } = target;
         let pixels = self.room.pixels;
-        self.views.push(ViewUniform::new(view, light, *background, pixels as u32, target_pixels));
+        self.views.push(ViewUniform::new(view, light, range, pixels as u32, target_pixels));
         let size = view.intrinsics.size;
         self.pictures.push(Picture { size, background: *background, stride: stride(view), pixels });
         self.room = self.room.with(view);

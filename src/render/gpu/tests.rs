@@ -106,8 +106,8 @@ impl<'a> Ran<'a> {
 
     /// What each pixel of each view sees.
     fn ids(&mut self) -> Vec<Vec<u32>> {
-        let bits = |view: &Vec<[f32; 1]>| view.iter().map(|[id]| id.to_bits()).collect();
-        self.pixels(Binding::Ids).iter().map(bits).collect()
+        let ids = |view: &Vec<[f32; 4]>| view.iter().map(|pixel| pixel[3] as u32).collect();
+        self.pixels(Binding::Colours).iter().map(ids).collect()
     }
 
     fn scale(&self) -> f32 {
@@ -202,7 +202,7 @@ fn silhouette() {
 fn loss_and_blend() {
     for_all(|mut ran| {
         // With respect to the blended colours where some are blended, and to all before they are.
-        let [pulled, blends] = [Binding::Pulled, Binding::Blends].map(|binding| ran.pixels::<4>(binding));
+        let (pulled, blends) = (ran.pixels::<3>(Binding::Pulled), ran.pixels::<4>(Binding::Blends));
         for ((pulled, blends), (frame, _)) in pulled.iter().zip(&blends).zip(ran.twins()) {
             let pulled: Vec<Vec3A> = pulled.iter().map(|pixel| Vec3A::from_slice(pixel)).collect();
             let error = difference(flat(&pulled).iter(), flat(&frame.unblended).iter());
@@ -240,7 +240,7 @@ fn backward() {
         let mut twin = Vec::new();
         // But for triangles one of whose pixels is not the same: of a sliver it asks much.
         let mut others = vec![false; triangles.len() * ran.targets.len()];
-        let (ids, pulled) = (ran.ids(), ran.pixels::<4>(Binding::Pulled));
+        let (ids, pulled) = (ran.ids(), ran.pixels::<3>(Binding::Pulled));
         for (view, (target, (frame, _))) in ran.targets.iter().zip(ran.twins()).enumerate() {
             for (at, (&one, &other)) in ids[view].iter().zip(&frame.raster.ids).enumerate() {
                 let apart = Vec3A::from_slice(&pulled[view][at]).distance(frame.unblended[at]);

@@ -52,15 +52,17 @@ fn backward(@builtin(global_invocation_id) id: vec3<u32>, @builtin(workgroup_id)
     var moment1 = normal0;
     var moment2 = normal0;
     if stays && all(low <= high) {
+        let seen = f32(triangle + 1u);
         let first = vec2<u32>(low);
         let last = vec2<u32>(high);
         for (var y = first.y; y <= last.y; y++) {
             let row = start + y * stride;
             for (var x = first.x; x <= last.x; x++) {
-                if ids[row + x] != triangle + 1u {
+                if colours[row + x].w != seen {
                     continue;
                 }
-                let pull = pulled[row + x].xyz;
+                let at = 3u * (row + x);
+                let pull = vec3<f32>(pulled[at], pulled[at + 1u], pulled[at + 2u]);
                 let spot = vec3<f32>(f32(x) - low.x, f32(y) - low.y, 1.0);
                 let a = vec3<f32>(dot(plane0, spot), dot(plane1, spot), dot(plane2, spot));
                 let inverse_sum = inverse_of(a.x + a.y + a.z);

@@ -29,7 +29,7 @@ fn blend(@builtin(global_invocation_id) id: vec3<u32>) {
 // Returns by how much a pixel's loss changes.
 fn blend_pixel(view: u32, pixel: vec2<u32>) -> f32 {
     let at = views[view].pixels + pixel.y * views[view].stride + pixel.x;
-    let wanted = targets[views[view].target_pixels + pixel.y * views[view].size.x + pixel.x];
+    let wanted = wanted_at(view, views[view].target_pixels + pixel.y * views[view].size.x + pixel.x);
     let before = abs(colours[at].xyz - wanted.xyz);
     let difference = blended(view, pixel) - wanted.xyz;
     blends[at] = vec4<f32>(sign(difference) * (wanted.w * batch.scale), 0.0);

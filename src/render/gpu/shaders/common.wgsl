@@ -19,14 +19,17 @@ struct View {
     rows: array<vec4<f32>, 3>,
     // L.
     light: array<vec4<f32>, 9>,
-    background: vec4<f32>,
     size: vec2<u32>,
     // Pixels in a row, with what fills it up.
     stride: u32,
     // Where this view begins among pixels, and among the targets' pixels, whose rows are not filled up.
     pixels: u32,
     target_pixels: u32,
-    padding: vec3<u32>,
+    // Targets are kept in 16 bits a number: colours from the lowest on, and weights up to the heaviest.
+    lowest: f32,
+    span: f32,
+    heaviest: f32,
+    padding: array<vec4<f32>, 2>,
 }
 
 const NEAR: f32 = 1e-6;
@@ -47,30 +50,44 @@ const STRIP: u32 = 16u;
 // The places of vertices among triangles and edges, a row a vertex: how rows begin, then the rows.
 @group(0) @binding(7) var<storage, read> corner_rows: array<u32>;
 @group(0) @binding(8) var<storage, read> end_rows: array<u32>;
-@group(0) @binding(9) var<storage, read> targets: array<vec4<f32>>;
+@group(0) @binding(9) var<storage, read> targets: array<vec2<u32>>;
 // (u w, v w, w, 1 / w), the last zero for what is not before the camera.
 @group(0) @binding(10) var<storage, read_write> corners: array<vec4<f32>>;
-@group(0) @binding(11) var<storage, read> ids: array<u32>;
-@group(0) @binding(12) var<storage, read> colours: array<vec4<f32>>;
-@group(0) @binding(13) var<storage, read_write> marks: array<u32>;
-// The gradient with respect to the colours.
-@group(0) @binding(14) var<storage, read_write> pulled: array<vec4<f32>>;
+// What pixels' centres see, and one more than the triangle's index; 0 for none.
+@group(0) @binding(11) var<storage, read> colours: array<vec4<f32>>;
+@group(0) @binding(12) var<storage, read_write> marks: array<u32>;
+// The gradient with respect to the colours, three numbers a pixel.
+@group(0) @binding(13) var<storage, read_write> pulled: array<f32>;
 // The same with respect to blended colours, at pixels that are marked; pictures where they are asked for.
-@group(0) @binding(15) var<storage, read_write> blends: array<vec4<f32>>;
-@group(0) @binding(16) var<storage, read_write> strip_losses: array<f32>;
-@group(0) @binding(17) var<storage, read_write> triangle_gradients: array<f32>;
-@group(0) @binding(18) var<storage, read_write> edge_gradients: array<vec2<f32>>;
+@group(0) @binding(14) var<storage, read_write> blends: array<vec4<f32>>;
+@group(0) @binding(15) var<storage, read_write> strip_losses: array<f32>;
+@group(0) @binding(16) var<storage, read_write> triangle_gradients: array<f32>;
+@group(0) @binding(17) var<storage, read_write> edge_gradients: array<vec2<f32>>;
 // What blending adds to the loss, for each edge in each view.
-@group(0) @binding(19) var<storage, read_write> edge_losses: array<f32>;
+@group(0) @binding(18) var<storage, read_write> edge_losses: array<f32>;
 // Edges that are silhouettes, as view * edges + edge, in any order.
-@group(0) @binding(20) var<storage, read> silhouettes: array<u32>;
+@group(0) @binding(19) var<storage, read> silhouettes: array<u32>;
 // Workgroups for them (x, y, z), and how many they are.
-@group(0) @binding(21) var<storage, read> silhouette_count: array<u32>;
+@group(0) @binding(20) var<storage, read> silhouette_count: array<u32>;
 // 6 or 9 numbers a vertex, then ROW sums of each view's loss; batches add to those before.
-@group(0) @binding(22) var<storage, read_write> result: array<f32>;
+@group(0) @binding(21) var<storage, read_write> result: array<f32>;
 
 fn corner(view: u32, vertex: u32) -> vec4<f32> {
     return corners[view * batch.vertices + vertex];
+}
+
+fn put_pulled(at: u32, value: vec3<f32>) {
+    pulled[3u * at] = value.x;
+    pulled[3u * at + 1u] = value.y;
+    pulled[3u * at + 2u] = value.z;
+}
+
+// A target's colour and weight.
+fn wanted_at(view: u32, at: u32) -> vec4<f32> {
+    let packed = targets[at];
+    let numbers = vec4<f32>(unpack2x16unorm(packed.x), unpack2x16unorm(packed.y));
+    return numbers * vec4<f32>(vec3<f32>(views[view].span), views[view].heaviest)
+        + vec4<f32>(vec3<f32>(views[view].lowest), 0.0);
 }
 
 fn cross2(a: vec2<f32>, b: vec2<f32>) -> f32 {

@@ -16,9 +16,9 @@ fn loss(@builtin(global_invocation_id) id: vec3<u32>, @builtin(workgroup_id) gro
     for (var y = first; y < end; y++) {
         for (var x = id.x; x < size.x; x += ROW) {
             let at = start + y * stride + x;
-            let wanted = targets[wanted_start + y * size.x + x];
+            let wanted = wanted_at(view, wanted_start + y * size.x + x);
             let difference = colours[at].xyz - wanted.xyz;
-            pulled[at] = vec4<f32>(sign(difference) * (wanted.w * batch.scale), 0.0);
+            put_pulled(at, sign(difference) * (wanted.w * batch.scale));
             let apart = abs(difference);
             sum += (apart.x + apart.y + apart.z) * wanted.w;
         }

@@ -8,5 +8,5 @@ fn picture(@builtin(global_invocation_id) id: vec3<u32>, @builtin(workgroup_id) 
         return;
     }
     let at = views[view].pixels + y * views[view].stride + id.x;
-    blends[at] = vec4<f32>(blended(view, vec2<u32>(id.x, y)), colours[at].w);
+    blends[at] = vec4<f32>(blended(view, vec2<u32>(id.x, y)), min(colours[at].w, 1.0));
 }

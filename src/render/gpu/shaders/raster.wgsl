@@ -1,18 +1,14 @@
-// Which triangle each pixel's centre sees, one more than its index, 0 for none; and its colour. Drawn once for each view.
+// The colour of what each pixel's centre sees, and which triangle that is: one more than its index, exact up to 2^24. Drawn
+// once for each view.
 
 struct Seen {
     @builtin(position) place: vec4<f32>,
-    @location(0) @interpolate(flat) id: u32,
+    @location(0) @interpolate(flat) id: f32,
     @location(1) normal: vec3<f32>,
     @location(2) albedo: vec3<f32>,
 }
 
-struct Shown {
-    @location(0) id: u32,
-    @location(1) colour: vec4<f32>,
-}
-
-@group(0) @binding(23) var<storage, read> drawn: array<vec4<f32>>;
+@group(0) @binding(22) var<storage, read> drawn: array<vec4<f32>>;
 @group(1) @binding(0) var<uniform> shown_view: View;
 
 @vertex
@@ -28,7 +24,7 @@ fn place(@builtin(vertex_index) index: u32, @builtin(instance_index) view: u32) 
         NEAR,
         corner.z,
     );
-    seen.id = index / 3u + 1u;
+    seen.id = f32(index / 3u + 1u);
     seen.normal = normals[vertex].xyz;
     seen.albedo = vec3<f32>(1.0);
     if batch.with_albedo != 0u {
@@ -38,7 +34,7 @@ fn place(@builtin(vertex_index) index: u32, @builtin(instance_index) view: u32) 
 }
 
 @fragment
-fn shade(seen: Seen) -> Shown {
+fn shade(seen: Seen) -> @location(0) vec4<f32> {
     let normal = seen.normal / max(length(seen.normal), LEAST_NORMAL);
-    return Shown(seen.id, vec4<f32>(light_colour(shown_view.light, normal) * seen.albedo, 1.0));
+    return vec4<f32>(light_colour(shown_view.light, normal) * seen.albedo, seen.id);
 }

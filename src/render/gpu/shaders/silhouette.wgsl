@@ -2,9 +2,9 @@
 // and view. Of several edges on one line the one that is farthest out is marked: a greatest integer, in any order. Marks
 // and counts are zero before.
 
-@group(0) @binding(13) var<storage, read_write> greatest: array<atomic<u32>>;
-@group(0) @binding(20) var<storage, read_write> listed: array<u32>;
-@group(0) @binding(21) var<storage, read_write> count: array<atomic<u32>, 4>;
+@group(0) @binding(12) var<storage, read_write> greatest: array<atomic<u32>>;
+@group(0) @binding(19) var<storage, read_write> listed: array<u32>;
+@group(0) @binding(20) var<storage, read_write> count: array<atomic<u32>, 4>;
 
 @compute @workgroup_size(64)
 fn silhouette(@builtin(global_invocation_id) id: vec3<u32>, @builtin(workgroup_id) group: vec3<u32>) {
@@ -51,7 +51,7 @@ fn is_seen(view: u32, s: Silhouette, c: Crossing) -> bool {
 }
 
 fn id_at(view: u32, place: u32) -> u32 {
-    return ids[views[view].pixels + place];
+    return u32(colours[views[view].pixels + place].w);
 }
 
 // 1 / w of a triangle at a pixel's centre: linear on the picture.
