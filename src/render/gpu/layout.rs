@@ -28,6 +28,7 @@ pub enum Binding {
     Result,
     /// [`Self::Corners`], where vertices are drawn: to read alone.
     Drawn,
+    Changed,
 }
 
 /// Threads in a row of pixels.

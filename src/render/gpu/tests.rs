@@ -104,6 +104,25 @@ impl<'a> Ran<'a> {
         views
     }
 
+    /// The gradient with respect to each pixel's colour in each view.
+    fn pulled(&mut self) -> Vec<Vec<Vec3A>> {
+        let (packed, changed) = (self.pixels::<1>(Binding::Pulled), self.pixels::<4>(Binding::Changed));
+        let scale = self.scale();
+        let pull = |([packed], changed): (&[f32; 1], &[f32; 4])| {
+            let packed = packed.to_bits();
+            let signs = [0, 2, 4].map(|shift| (packed >> shift & 3) as f32 - 1.0);
+            // The heaviest of the tests' weights is one.
+            let weight = (packed >> 16) as f32 / 65535.0;
+            let is_changed = packed & 64 != 0;
+            if is_changed { Vec3A::from_slice(changed) } else { Vec3A::from_array(signs) * (weight * scale) }
+        };
+        packed
+            .iter()
+            .zip(&changed)
+            .map(|(packed, changed)| packed.iter().zip(changed).map(pull).collect())
+            .collect()
+    }
+
     /// What each pixel of each view sees.
     fn ids(&mut self) -> Vec<Vec<u32>> {
         let ids = |view: &Vec<[f32; 4]>| view.iter().map(|pixel| pixel[3] as u32).collect();
@@ -202,10 +221,9 @@ fn silhouette() {
 fn loss_and_blend() {
     for_all(|mut ran| {
         // With respect to the blended colours where some are blended, and to all before they are.
-        let (pulled, blends) = (ran.pixels::<3>(Binding::Pulled), ran.pixels::<4>(Binding::Blends));
+        let (pulled, blends) = (ran.pulled(), ran.pixels::<4>(Binding::Blends));
         for ((pulled, blends), (frame, _)) in pulled.iter().zip(&blends).zip(ran.twins()) {
-            let pulled: Vec<Vec3A> = pulled.iter().map(|pixel| Vec3A::from_slice(pixel)).collect();
-            let error = difference(flat(&pulled).iter(), flat(&frame.unblended).iter());
+            let error = difference(flat(pulled).iter(), flat(&frame.unblended).iter());
             assert!(error < 0.01, "{error}");
             let crossed = frame.crossings.iter().map(|(_, crossing)| crossing.blend().0);
             let (found, wanted): (Vec<Vec3A>, Vec<Vec3A>) =
@@ -240,10 +258,10 @@ fn backward() {
         let mut twin = Vec::new();
         // But for triangles one of whose pixels is not the same: of a sliver it asks much.
         let mut others = vec![false; triangles.len() * ran.targets.len()];
-        let (ids, pulled) = (ran.ids(), ran.pixels::<3>(Binding::Pulled));
+        let (ids, pulled) = (ran.ids(), ran.pulled());
         for (view, (target, (frame, _))) in ran.targets.iter().zip(ran.twins()).enumerate() {
             for (at, (&one, &other)) in ids[view].iter().zip(&frame.raster.ids).enumerate() {
-                let apart = Vec3A::from_slice(&pulled[view][at]).distance(frame.unblended[at]);
+                let apart = pulled[view][at].distance(frame.unblended[at]);
                 let differ = one != other || apart > 1e-3 * ran.scale();
                 for id in [one, other].into_iter().filter(|&id| differ && id != 0) {
                     others[view * triangles.len() + id as usize - 1] = true;

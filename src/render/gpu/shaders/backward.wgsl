@@ -61,8 +61,11 @@ fn backward(@builtin(global_invocation_id) id: vec3<u32>, @builtin(workgroup_id)
                 if colours[row + x].w != seen {
                     continue;
                 }
-                let at = 3u * (row + x);
-                let pull = vec3<f32>(pulled[at], pulled[at + 1u], pulled[at + 2u]);
+                let packed = pulled[row + x];
+                var pull = pull_of(view, packed);
+                if (packed & CHANGED) != 0u {
+                    pull = changed[row + x].xyz;
+                }
                 let spot = vec3<f32>(f32(x) - low.x, f32(y) - low.y, 1.0);
                 let a = vec3<f32>(dot(plane0, spot), dot(plane1, spot), dot(plane2, spot));
                 let inverse_sum = inverse_of(a.x + a.y + a.z);

@@ -27,7 +27,8 @@ fn silhouette_backward(@builtin(global_invocation_id) id: vec3<u32>) {
             let place = select(c.first, c.second, i % 2u == 1u);
             let pixel = vec2<u32>(place % stride, place / stride);
             if is_first(view, pixel, s.axis + 2u * (i % 2u)) {
-                put_pulled(start + place, unblended(view, pixel));
+                changed[start + place] = vec4<f32>(unblended(view, pixel), 0.0);
+                pulled[start + place] |= CHANGED;
             }
         }
     }
