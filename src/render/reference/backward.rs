@@ -3,7 +3,7 @@
 use glam::{Vec2, Vec3A};
 
 use super::corner::{Corner, doubled_area};
-use super::patch::Patch;
+use super::patch::{Patch, Weights};
 use super::raster::Raster;
 use super::shade::Looks;
 use super::silhouette::{Crossing, Silhouette};
@@ -115,22 +115,20 @@ impl Sums {
         let mut lit = upstream;
         if let Some(albedo) = looks.albedo {
             let of_albedo = upstream * Vec3A::from_array(light.colour(normal));
-            for k in 0..3 {
-                self.albedo[k] += of_albedo * weights.corners[k];
-                by_weight[k] = of_albedo.dot(albedo[k]);
-            }
+            add_weighted(&mut self.albedo, of_albedo, &weights);
+            by_weight = albedo.map(|corner| of_albedo.dot(corner));
             lit *= weights.mean(albedo);
         }
         let of_unit = light.pull_back(normal, lit.to_array());
         let of_normal = (of_unit - normal * normal.dot(of_unit)) * inverse_length;
-        for k in 0..3 {
-            self.normals[k] += of_normal * weights.corners[k];
-            by_weight[k] += of_normal.dot(looks.normals[k]);
-        }
+        add_weighted(&mut self.normals, of_normal, &weights);
         if patch.is_wide {
-            let mean: f32 = (0..3).map(|k| by_weight[k] * weights.corners[k]).sum();
-            for k in 0..3 {
-                self.moments[k] += weights.from * ((by_weight[k] - mean) * weights.inverse_sum);
+            let by_weight = Vec3A::from_array(by_weight)
+                + Vec3A::from_array(looks.normals.map(|corner| of_normal.dot(corner)));
+            let mean = by_weight.dot(Vec3A::from_array(weights.corners));
+            let of_a = (by_weight - mean) * weights.inverse_sum;
+            for (moment, of_a) in self.moments.iter_mut().zip(of_a.to_array()) {
+                *moment += weights.from * of_a;
             }
         }
     }
@@ -146,6 +144,14 @@ impl Sums {
             let position = pull_back_projection(projection, h);
             VertexGradient { position, normal: self.normals[k], albedo: self.albedo[k] }
         })
+    }
+}
+
+/// Adds a gradient with respect to a weighted mean to those with respect to what the corners have.
+#[inline]
+fn add_weighted(sums: &mut [Vec3A; 3], upstream: Vec3A, weights: &Weights) {
+    for (sum, weight) in sums.iter_mut().zip(weights.corners) {
+        *sum += upstream * weight;
     }
 }
 
