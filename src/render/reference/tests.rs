@@ -327,6 +327,28 @@ fn the_whole_gradient_is_that_of_supersampled_pictures() {
 }
 
 #[test]
+fn outlines_are_placed_within_parts_of_a_pixel() {
+    let radius = |scale: f32| {
+        let sphere = Scene::bumpy(4);
+        sphere.moved(sphere.positions.iter().map(|p| *p * scale).collect())
+    };
+    let mut target = targets(&views(1, [64, 64]), &mut Random::new(4)).remove(0);
+    (target.light, target.background, target.weights) = (Light::uniform([1.0; 3]), [0.0; 3], None);
+    let truth = Scene { albedo: vec![[1.0; 3]; 2562], ..radius(1.0) };
+    target.colours = supersampled(&truth, &target, 16).iter().map(|colour| colour.to_array()).collect();
+    // The sphere is about 22 pixels in radius.
+    for off in [0.1, 0.2, 0.5, 1.5] {
+        let slope = |scale: f32| -> f32 {
+            let scene = Scene { albedo: truth.albedo.clone(), ..radius(scale) };
+            let gradient = whole_gradient(&scene, std::slice::from_ref(&target));
+            scene.positions.iter().zip(&gradient).map(|(p, g)| p.dot(*g)).sum()
+        };
+        let slopes = [slope(1.0 - off / 22.0), slope(1.0 + off / 22.0)];
+        assert!(slopes[0] < 0.0 && slopes[1] > 0.0, "{off}: {slopes:?}");
+    }
+}
+
+#[test]
 fn the_same_bytes_whatever_the_threads() {
     let scene = Scene::eared();
     let targets = targets(&views(6, [40, 30]), &mut Random::new(4));
