@@ -80,7 +80,7 @@ impl Buffers {
             blends: empty(inner, 4 * room.pixels),
             changed: empty(inner, 4 * room.pixels),
             strip_losses: empty(inner, u64::from(ROW * room.strips) * room.views),
-            triangle_gradients: empty(inner, TRIANGLE_GRADIENT * triangles * room.views),
+            triangle_gradients: empty(inner, TRIANGLE_GRADIENT * triangles * room.groups()),
             edge_gradients: empty(output, EDGE_GRADIENT * edges * room.views),
             edge_losses: empty(output, edges * room.views),
             silhouettes: empty(inner, edges * room.views),

@@ -39,6 +39,8 @@ const RIM: u32 = 0xffffffffu;
 // Threads in a row of pixels, and rows in a strip, of which a thread sums up its own.
 const ROW: u32 = 64u;
 const STRIP: u32 = 16u;
+// Views of which a triangle's gradient is summed up by one thread.
+const GROUP: u32 = 4u;
 
 @group(0) @binding(0) var<uniform> batch: Batch;
 @group(0) @binding(1) var<storage, read> views: array<View>;
@@ -63,7 +65,7 @@ const STRIP: u32 = 16u;
 @group(0) @binding(14) var<storage, read_write> blends: array<vec4<f32>>;
 @group(0) @binding(15) var<storage, read_write> strip_losses: array<f32>;
 @group(0) @binding(16) var<storage, read_write> triangle_gradients: array<f32>;
-@group(0) @binding(17) var<storage, read_write> edge_gradients: array<vec2<f32>>;
+@group(0) @binding(17) var<storage, read_write> edge_gradients: array<f32>;
 // What blending adds to the loss, for each edge in each view.
 @group(0) @binding(18) var<storage, read_write> edge_losses: array<f32>;
 // Edges that are silhouettes, as view * edges + edge, in any order.

@@ -203,19 +203,21 @@ fn backward() {
     for_all(|mut ran| {
         let triangles = &ran.shape.topology.triangles;
         let width = if ran.with_albedo { 9 } else { 6 };
-        let gradients = ran.read(Binding::TriangleGradients, 3 * width * triangles.len() * ran.targets.len());
+        // One group of views.
+        assert!(ran.targets.len() <= layout::GROUP as usize);
+        let gradients = ran.read(Binding::TriangleGradients, 3 * width * triangles.len());
         let surface = ran.surface();
         let closed = !ran.shape.topology.on_rim.contains(&true);
-        let mut twin = Vec::new();
+        let mut twin = vec![0.0; gradients.len()];
         // But for triangles one of whose pixels is not the same: of a sliver it asks much.
-        let mut others = vec![false; triangles.len() * ran.targets.len()];
+        let mut others = vec![false; triangles.len()];
         let (ids, pulled) = (ran.ids(), ran.pulled());
         for (view, (target, (frame, _))) in ran.targets.iter().zip(ran.twins()).enumerate() {
             for (at, (&one, &other)) in ids[view].iter().zip(&frame.raster.ids).enumerate() {
                 let apart = pulled[view][at].distance(frame.unblended[at]);
                 let differ = one != other || apart > 1e-3 * ran.scale();
                 for id in [one, other].into_iter().filter(|&id| differ && id != 0) {
-                    others[view * triangles.len() + id as usize - 1] = true;
+                    others[id as usize - 1] = true;
                 }
             }
             let projection = target.view.projection();
@@ -225,11 +227,12 @@ fn backward() {
                 raster: &frame.raster,
                 gradient: &frame.unblended,
             };
-            for (id, &ends) in (1..).zip(triangles) {
+            for ((id, &ends), sums) in (1..).zip(triangles).zip(twin.chunks_exact_mut(3 * width)) {
                 let corners = ends.map(|end| &frame.corners[end as usize]);
                 let parts = pulled.triangle(id, corners, &Looks::new(&surface, ends), closed);
-                for VertexGradient { position, normal, albedo } in parts.unwrap_or_default() {
-                    twin.extend(&flat(&[position, normal, albedo])[..width]);
+                let parts = parts.unwrap_or_default().map(|part| [part.position, part.normal, part.albedo]);
+                for (sums, part) in sums.chunks_exact_mut(width).zip(parts) {
+                    sums.iter_mut().zip(flat(&part)).for_each(|(sum, number)| *sum += number);
                 }
             }
         }
@@ -282,7 +285,7 @@ fn gather() {
         let width = if ran.with_albedo { 9 } else { 6 };
         let sums = ran.read(Binding::Result, width * vertices);
         let [triangles, edges] = [&ran.shape.topology.triangles.len(), &ran.shape.topology.edges.len()];
-        let of_triangles = ran.read(Binding::TriangleGradients, 3 * width * triangles * ran.targets.len());
+        let of_triangles = ran.read(Binding::TriangleGradients, 3 * width * triangles);
         let of_edges = ran.read(Binding::EdgeGradients, 6 * edges * ran.targets.len());
         let mut twin = vec![0f64; width * vertices];
         let mut add = |vertex: u32, numbers: &[f32]| {

@@ -74,11 +74,12 @@ fn assert_alike((value, gradient): &(f64, RenderGradient), twin: &(f64, RenderGr
 #[test]
 fn whole_losses_and_pictures_are_as_the_reference_s() {
     let Some(mut gpu) = gpu() else { return };
-    let targets = mixed_targets();
+    // More than a group of views.
+    let targets = [mixed_targets(), mixed_targets()].concat();
     for shape in shapes() {
         gpu.prepare(MeshLayout::of(&shape.topology), &targets).unwrap();
         let mut reference = prepared(Reference::new(), &shape, &targets);
-        for listed in [&[0, 1, 2][..], &[2], &[1, 0], &[0, 0, 2, 1, 1, 2]] {
+        for listed in [&[0, 1, 2, 3, 4, 5][..], &[2], &[1, 0], &[0, 0, 2, 1, 1, 2, 0, 0, 0]] {
             assert_alike(&outcome(&mut gpu, &shape, listed), &outcome(&mut reference, &shape, listed));
         }
         for target in 0..targets.len() {
