@@ -3,11 +3,11 @@
 use glam::{Vec2, Vec3A};
 
 use super::corner::{Corner, doubled_area};
+use super::lamp::Lamp;
 use super::patch::{Patch, Weights};
 use super::raster::Raster;
 use super::shade::Looks;
 use super::silhouette::{Crossing, Silhouette};
-use crate::render::Light;
 
 /// The gradient with respect to one vertex.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -29,7 +29,7 @@ impl std::ops::AddAssign for VertexGradient {
 #[derive(Debug, Clone, Copy)]
 pub struct Pulled<'a> {
     pub projection: &'a [[f32; 4]; 3],
-    pub light: &'a Light,
+    pub lamp: &'a Lamp,
     pub raster: &'a Raster,
     /// `[H * W]`.
     pub gradient: &'a [Vec3A],
@@ -56,7 +56,7 @@ impl Pulled<'_> {
             let at = y * self.raster.width;
             for x in columns[0]..=columns[1] {
                 if self.raster.ids[at + x] == id {
-                    sums.add(&patch, x as i32, y as i32, looks, self.light, self.gradient[at + x]);
+                    sums.add(&patch, x as i32, y as i32, looks, self.lamp, self.gradient[at + x]);
                 }
             }
         }
@@ -108,18 +108,18 @@ struct Sums {
 
 impl Sums {
     #[inline]
-    fn add(&mut self, patch: &Patch, x: i32, y: i32, looks: &Looks, light: &Light, upstream: Vec3A) {
+    fn add(&mut self, patch: &Patch, x: i32, y: i32, looks: &Looks, lamp: &Lamp, upstream: Vec3A) {
         let weights = patch.at(x, y);
         let (normal, inverse_length) = looks.normal(&weights);
         let mut by_weight = [0.0; 3];
         let mut lit = upstream;
         if let Some(albedo) = looks.albedo {
-            let of_albedo = upstream * Vec3A::from_array(light.colour(normal));
+            let of_albedo = upstream * lamp.colour(normal);
             add_weighted(&mut self.albedo, of_albedo, &weights);
             by_weight = albedo.map(|corner| of_albedo.dot(corner));
             lit *= weights.mean(albedo);
         }
-        let of_unit = light.pull_back(normal, lit.to_array());
+        let of_unit = lamp.pull_back(normal, lit);
         let of_normal = (of_unit - normal * normal.dot(of_unit)) * inverse_length;
         add_weighted(&mut self.normals, of_normal, &weights);
         if patch.is_wide {

@@ -4,6 +4,7 @@ use glam::{DVec3, Vec3A};
 
 use super::backward::{Pulled, VertexGradient};
 use super::frame::Frame;
+use super::lamp::Lamp;
 use super::shade::{Looks, shade};
 use super::*;
 use crate::mesh::Normals;
@@ -185,7 +186,7 @@ impl Held {
         let light = light();
         let pulled = Pulled {
             projection: &projection,
-            light: &light,
+            lamp: &Lamp::new(&light),
             raster: &self.frame.raster,
             gradient: &self.upstream,
         };
@@ -235,8 +236,12 @@ fn pull_back_of_crossings_to_positions() {
         let mesh = connectivity(&scene);
         let projection = target.view.projection();
         let lit = light();
-        let pulled =
-            Pulled { projection: &projection, light: &lit, raster: &frame.raster, gradient: &frame.colours };
+        let pulled = Pulled {
+            projection: &projection,
+            lamp: &Lamp::new(&lit),
+            raster: &frame.raster,
+            gradient: &frame.colours,
+        };
         let mut random = Random::new(12);
         let upstream: Vec<f32> = frame.crossings.iter().map(|_| random.signed() as f32).collect();
         let mut gradient = vec![Vec3A::ZERO; scene.positions.len()];

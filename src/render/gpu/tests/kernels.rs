@@ -3,6 +3,7 @@
 use super::*;
 use crate::render::reference::backward::{Pulled, VertexGradient};
 use crate::render::reference::frame::{Frame, Job};
+use crate::render::reference::lamp::Lamp;
 use crate::render::reference::shade::Looks;
 
 /// The numbers of a buffer after the passes of a loss over all targets.
@@ -223,7 +224,7 @@ fn backward() {
             let projection = target.view.projection();
             let pulled = Pulled {
                 projection: &projection,
-                light: &target.light,
+                lamp: &Lamp::new(&target.light),
                 raster: &frame.raster,
                 gradient: &frame.unblended,
             };
@@ -262,7 +263,7 @@ fn silhouette_backward() {
             let projection = target.view.projection();
             let pulled = Pulled {
                 projection: &projection,
-                light: &target.light,
+                lamp: &Lamp::new(&target.light),
                 raster: &frame.raster,
                 gradient: &frame.unblended,
             };
