@@ -9,7 +9,7 @@ use onemesh::render::{
 /// Says what this machine has for onemesh: processor, threads, and graphics adapters; the exit code is 0 if one draws.
 #[derive(Debug, clap::Args)]
 pub struct Doctor {
-    /// The adapter to try: best, reference, or part of a name
+    /// The adapter to try: best, fastest, reference, or part of a name
     #[arg(long, default_value = "best", value_name = "NAME", env = "ONEMESH_ADAPTER")]
     adapter: AdapterChoice,
 }
@@ -22,7 +22,7 @@ impl Doctor {
         println!("processors: {cores}, threads: {}", rayon::current_num_threads());
         println!("processor: {}, with {}", std::env::consts::ARCH, listed(features()));
         let found = adapters();
-        println!("graphics adapters: {}", if found.is_empty() { "none" } else { "" }.trim_end());
+        println!("graphics adapters:{}", if found.is_empty() { " none" } else { "" });
         for adapter in &found {
             println!("  {adapter}");
         }
