@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Crates that only some files may name, and where.
-const KEPT: [(&str, &[&str]); 18] = [
+const KEPT: [(&str, &[&str]); 21] = [
     ("nalgebra_sparse", &["numeric/cholesky.rs"]),
     ("clap", &["cli/", "main.rs"]),
     ("anyhow", &["cli/"]),
@@ -24,6 +24,9 @@ const KEPT: [(&str, &[&str]); 18] = [
     ("apalis_sqlite", &["job/queue.rs"]),
     ("lru", &["job/cache.rs"]),
     ("postcard", &["pipeline/state.rs"]),
+    ("wgpu", &["render/"]),
+    ("bytemuck", &["render/"]),
+    ("pollster", &["render/"]),
 ];
 
 /// The lines of code of every source file, by its path under `src/`.

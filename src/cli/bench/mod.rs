@@ -4,6 +4,7 @@ mod clock;
 mod kernels;
 mod memory;
 mod readers;
+mod rendering;
 mod service;
 mod stages;
 
@@ -53,6 +54,8 @@ enum Part {
     Collection,
     /// The sculpted collection through the service's jobs, from upload to results
     Service,
+    /// Pictures of sixteen views compared with targets, and the gradient
+    Rendering,
 }
 
 impl Bench {
@@ -100,6 +103,9 @@ impl Bench {
             kernels::solves(&clock, finest);
             kernels::iteration(&clock);
             kernels::self_intersection(&clock);
+        }
+        if self.does(Part::Rendering) {
+            rendering::rendering(&clock)?;
         }
         Ok(())
     }
