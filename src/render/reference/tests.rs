@@ -26,7 +26,6 @@ fn scenes() -> [Scene; 3] {
     [Scene::bumpy(3), Scene::eared(), Scene::bowl()]
 }
 
-
 /// The nearest triangle on the ray through a pixel's centre, and where; back faces too if they are drawn.
 fn cast(scene: &Scene, view: &View, x: usize, y: usize, closed: bool) -> Option<(u32, f64, DVec3)> {
     let seen = view.intrinsics.direction(glam::DVec2::new(x as f64 + 0.5, y as f64 + 0.5));
