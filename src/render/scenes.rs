@@ -20,8 +20,8 @@ impl Scene {
     fn new(positions: Vec<Vec3A>, triangles: &[[u32; 3]]) -> Self {
         let topology = Topology::new(positions.len(), triangles);
         let normals = Normals::new(&topology, &positions).vertices;
-        let mut random = Random::new(5);
-        let albedo = positions.iter().map(|_| [0; 3].map(|_| 0.3 + 0.7 * random.unit() as f32)).collect();
+        let albedo =
+            positions.iter().map(|p| (0.65 + 0.35 * (3.0 * *p + 1.0).map(f32::sin)).to_array()).collect();
         Self { topology, positions, normals, albedo }
     }
 
@@ -100,8 +100,8 @@ pub fn targets(views: &[View], random: &mut Random) -> Vec<Target> {
         .map(|&view| {
             let [width, height] = view.size();
             let patches: Vec<[f32; 3]> =
-                (0..64).map(|_| [0; 3].map(|_| if random.unit() < 0.5 { -1.0 } else { 3.0 })).collect();
-            let patch = |x: usize, y: usize| patches[(8 * y / height) * 8 + 8 * x / width];
+                (0..4).map(|_| [0; 3].map(|_| if random.unit() < 0.5 { -1.0 } else { 3.0 })).collect();
+            let patch = |x: usize, y: usize| patches[(2 * y / height) * 2 + 2 * x / width];
             let colours = (0..width * height).map(|i| patch(i % width, i / width)).collect();
             let weights = (0..width * height).map(|i| if i % 7 == 0 { 0.5 } else { 1.0 }).collect();
             Target { view, light: light(), background: [0.1, 0.2, 0.05], colours, weights: Some(weights) }
