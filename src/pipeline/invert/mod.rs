@@ -6,6 +6,7 @@
 mod cameras;
 mod descent;
 mod error;
+mod files;
 mod hull;
 mod light;
 mod pictures;
@@ -26,7 +27,7 @@ use std::time::Instant;
 use glam::{DVec3, Vec3A};
 
 pub use error::InvertError;
-pub use pictures::{ViewPictures, contact_sheet};
+pub use pictures::ViewPictures;
 pub use report::{AdapterEntry, HullReport, InversionReport, ViewReport};
 pub use settings::{Albedo, InvertLevel, InvertPreset, InvertSettings, Smooth, What};
 pub use shown::Shown;
