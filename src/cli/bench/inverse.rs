@@ -39,6 +39,9 @@ pub struct Inverse {
     /// Iterations of the `paper` preset in place of its own
     #[arg(long, value_name = "N", requires = "inverse")]
     iterations: Option<usize>,
+    /// Sets one parameter of every run by its dotted name; may be repeated
+    #[arg(long, value_name = "NAME=VALUE", requires = "inverse")]
+    set: Vec<String>,
     /// Which ones
     #[arg(long, value_enum, default_values_t = [Way::On, Way::Off, Way::Default], value_name = "WAY", requires = "inverse")]
     ways: Vec<Way>,
@@ -113,6 +116,10 @@ impl Inverse {
             Way::Laplacian => settings.smoothed(false),
             Way::BiLaplacian => settings.smoothed(true),
         };
+        for assignment in &self.set {
+            let (name, value) = assignment.split_once('=').context("--set: write it as NAME=VALUE")?;
+            settings.set(name, value).with_context(|| format!("--set {assignment}"))?;
+        }
         for level in &mut settings.levels {
             level.size = level.size.min(self.size);
             if let Some(iterations) = self.iterations.filter(|_| preset == InvertPreset::Paper) {
