@@ -82,6 +82,7 @@ pub fn register_member(
     watch: &Watch,
     turn: Turn,
 ) -> Result<Vec<Vec3A>, Canceled> {
+    let (scan, landmarks) = (member.scan, member.landmarks);
     let mut registration = Registration::new(rest, member, settings);
     for phase in 0..settings.phases {
         registration.enter(phase);
@@ -92,8 +93,11 @@ pub fn register_member(
     }
     let mut p = registration.p;
     if turn.last {
-        settle(rest, registration.scan, &settings.settle, &mut p);
-        unfold(&rest.connectivity, registration.scan, registration.landmarks, &mut p);
+        // What settles on a fold keeps it, and settling may fold what was thin.
+        let unfold = |p: &mut _| unfold(&rest.connectivity, scan, landmarks, p);
+        unfold(&mut p);
+        settle(rest, scan, &settings.settle, &mut p);
+        unfold(&mut p);
     }
     Ok(p)
 }
