@@ -166,3 +166,15 @@ fn adapters_are_chosen_by_name() {
     let error = Gpu::open(&AdapterChoice::Named("no such card".into())).unwrap_err();
     assert!(error.to_string().contains(&gpu.adapter().name), "{error}");
 }
+
+#[test]
+fn without_targets_or_weights_there_is_no_loss() {
+    let Some(mut gpu) = gpu() else { return };
+    let (shape, mut targets) = (Shape::bowl(), mixed_targets());
+    gpu.prepare(MeshLayout::of(&shape.topology), &[]).unwrap();
+    assert_eq!(outcome(&mut gpu, &shape, &[]).0, 0.0);
+    targets[0].weights = Some(vec![0.0; targets[0].colours.len()]);
+    gpu.prepare(MeshLayout::of(&shape.topology), &targets).unwrap();
+    let (value, gradient) = outcome(&mut gpu, &shape, &[0]);
+    assert!(value == 0.0 && gradient.positions.iter().all(|pull| *pull == Vec3A::ZERO));
+}
