@@ -60,9 +60,11 @@ pub enum RenderError {
         /// Number of vertices N.
         vertices: usize,
     },
-    /// A vertex nowhere.
-    #[error("the position of vertex {vertex} is not finite")]
+    /// A vertex nowhere, or of no colour.
+    #[error("the {what} of vertex {vertex} is not finite")]
     NotFinite {
+        /// Its position, normal or albedo.
+        what: &'static str,
         /// Which.
         vertex: usize,
     },

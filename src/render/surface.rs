@@ -59,8 +59,12 @@ impl Surface<'_> {
                 return Err(RenderError::Count { what, found, vertices });
             }
         }
-        match self.positions.iter().position(|position| !position.is_finite()) {
-            Some(vertex) => Err(RenderError::NotFinite { vertex }),
+        let vectors = [("position", self.positions), ("normal", self.normals)]
+            .map(|(what, vectors)| (what, vectors.iter().position(|vector| !vector.is_finite())));
+        let mut albedo = self.albedo.unwrap_or_default().iter();
+        let albedo = ("albedo", albedo.position(|colour| !colour.iter().all(|part| part.is_finite())));
+        match vectors.into_iter().chain([albedo]).find_map(|(what, found)| Some((what, found?))) {
+            Some((what, vertex)) => Err(RenderError::NotFinite { what, vertex }),
             None => Ok(()),
         }
     }

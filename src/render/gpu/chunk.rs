@@ -7,6 +7,9 @@ use crate::render::{RenderError, Target, View};
 /// Pixels that are worked on at once at most, where one picture alone has fewer: hundreds of megabytes.
 const MOST_PIXELS: u64 = 1 << 22;
 
+/// Threads of a workgroup.
+const WORKGROUP: u64 = 64;
+
 /// What a number of views takes.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Room {
@@ -69,6 +72,16 @@ pub fn chunks(
     limits: &wgpu::Limits,
 ) -> Result<Vec<(Range<usize>, Room)>, RenderError> {
     let largest = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+    let most_threads = WORKGROUP * u64::from(limits.max_compute_workgroups_per_dimension);
+    let threads = mesh.vertices.max(mesh.triangles.len()).max(mesh.edges.len()) as u64;
+    if threads > most_threads {
+        return Err(RenderError::TooLarge {
+            what: "the mesh's number of edges, triangles or vertices".into(),
+            found: threads,
+            limit: most_threads,
+            remedy: "simplify the mesh",
+        });
+    }
     let of_view = 4
         * (TRIANGLE_GRADIENT * mesh.triangles.len() as u64)
             .max(EDGE_GRADIENT * mesh.edges.len() as u64)
@@ -81,7 +94,9 @@ pub fn chunks(
             remedy: "simplify the mesh",
         });
     }
-    let most_views = (largest / of_view).min(u64::from(limits.max_texture_array_layers));
+    // Every edge may be a silhouette in every view.
+    let of_edges = most_threads / (mesh.edges.len() as u64).max(1);
+    let most_views = (largest / of_view).min(of_edges).min(u64::from(limits.max_texture_array_layers));
     let mut chunks: Vec<(Range<usize>, Room)> = Vec::new();
     for (index, target) in targets.iter().enumerate() {
         let alone = Room::default().with(&target.view);

@@ -369,3 +369,44 @@ fn the_same_bytes_whatever_the_threads() {
     };
     assert_eq!(run(1), run(3));
 }
+
+#[test]
+fn what_cannot_be_drawn_is_refused_by_name() {
+    let scene = Scene::eared();
+    let good = targets(&views(2, [20, 10]), &mut Random::new(4));
+    let layout = MeshLayout::of(&scene.topology);
+    let prepare = |mesh, targets: &[Target]| Reference::new().prepare(mesh, targets).unwrap_err().to_string();
+    let spoiled = |spoil: fn(&mut Target)| {
+        let mut targets = good.clone();
+        spoil(&mut targets[1]);
+        prepare(layout, &targets)
+    };
+    let refusals = [
+        (spoiled(|target| target.colours.truncate(199)), "target 1: 199 colours for 20 x 10 pixels"),
+        (spoiled(|target| target.colours[3][1] = f32::NAN), "target 1: its colours, light or background"),
+        (spoiled(|target| target.weights = Some(vec![1.0])), "target 1: 1 weights for 20 x 10"),
+        (spoiled(|target| target.weights = Some(vec![-1.0; 200])), "target 1: a weight is negative"),
+        (spoiled(|target| target.view.pose.translation.x = f64::NAN), "target 1: its camera"),
+        (spoiled(|target| target.view.intrinsics.size = [0, 4]), "target 1: its picture is 0 x 4"),
+        (prepare(MeshLayout { vertices: 5, ..layout }, &good), "and the mesh has 5 vertices"),
+        (prepare(MeshLayout { triangles: &[], ..layout }, &good), "no triangles"),
+    ];
+    for (said, wanted) in refusals {
+        assert!(said.contains(wanted), "{said}");
+    }
+
+    let mut renderer = Reference::new();
+    let mut gradient = RenderGradient::default();
+    let surface = scene.surface();
+    assert_eq!(renderer.loss(&surface, &[], &mut gradient), Err(RenderError::NoTriangles));
+    renderer.prepare(layout, &good).unwrap();
+    assert_eq!(renderer.loss(&surface, &[], &mut gradient), Ok(0.0));
+    let other = Err(RenderError::NoSuchTarget { index: 2, targets: 2 });
+    assert_eq!(renderer.loss(&surface, &[0, 2], &mut gradient), other);
+    let few = Surface { normals: &surface.normals[1..], ..surface };
+    assert!(renderer.loss(&few, &[0], &mut gradient).unwrap_err().to_string().contains("normals for a mesh"));
+    let mut normals = scene.normals.clone();
+    normals[7].y = f32::INFINITY;
+    let error = renderer.picture(&Surface { normals: &normals, ..surface }, 0).unwrap_err();
+    assert_eq!(error.to_string(), "the normal of vertex 7 is not finite");
+}

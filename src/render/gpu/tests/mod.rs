@@ -166,3 +166,34 @@ fn adapters_are_chosen_by_name() {
     let error = Gpu::open(&AdapterChoice::Named("no such card".into())).unwrap_err();
     assert!(error.to_string().contains(&gpu.adapter().name), "{error}");
 }
+
+#[test]
+fn without_targets_or_weights_there_is_no_loss() {
+    let Some(mut gpu) = gpu() else { return };
+    let (shape, mut targets) = (Shape::bowl(), mixed_targets());
+    gpu.prepare(MeshLayout::of(&shape.topology), &[]).unwrap();
+    assert_eq!(outcome(&mut gpu, &shape, &[]).0, 0.0);
+    targets[0].weights = Some(vec![0.0; targets[0].colours.len()]);
+    gpu.prepare(MeshLayout::of(&shape.topology), &targets).unwrap();
+    let (value, gradient) = outcome(&mut gpu, &shape, &[0]);
+    assert!(value == 0.0 && gradient.positions.iter().all(|pull| *pull == Vec3A::ZERO));
+}
+
+#[test]
+fn shaders_have_the_constants_of_the_reference() {
+    use crate::render::reference::{corner::NEAR, patch::LEAST_AREA, shade::LEAST_NORMAL};
+    let common = include_str!("../shaders/common.wgsl");
+    let constants = [
+        ("NEAR: f32", f64::from(NEAR)),
+        ("LEAST_AREA: f32", f64::from(LEAST_AREA)),
+        ("LEAST_NORMAL: f32", f64::from(LEAST_NORMAL)),
+        ("ROW: u32", f64::from(ROW)),
+        ("STRIP: u32", f64::from(layout::STRIP)),
+        ("GROUP: u32", f64::from(layout::GROUP)),
+    ];
+    for (name, wanted) in constants {
+        let line = common.lines().find_map(|line| line.strip_prefix(&format!("const {name} = ")));
+        let found: f64 = line.unwrap().trim_end_matches(['u', ';']).parse().unwrap();
+        assert!((found / wanted - 1.0).abs() < 1e-6, "{name}: {found} {wanted}");
+    }
+}
