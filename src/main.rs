@@ -32,6 +32,7 @@ enum Command {
     Key(cli::Key),
     Openapi(cli::Openapi),
     Health(cli::Health),
+    Doctor(cli::Doctor),
 }
 
 fn main() -> ExitCode {
@@ -51,5 +52,6 @@ fn main() -> ExitCode {
         Command::Key(command) => command.run(),
         Command::Openapi(command) => command.run(),
         Command::Health(command) => command.run(),
+        Command::Doctor(command) => command.run(),
     }))
 }

@@ -92,8 +92,10 @@ pub fn adapters() -> Vec<Adapter> {
 /// # Errors
 /// [`RenderError::NoAdapter`], [`RenderError::NoSuchAdapter`], or [`RenderError::Device`] where the driver fails.
 pub fn open(choice: &AdapterChoice) -> Result<Box<dyn Renderer>, RenderError> {
+    let in_software = || adapters().first().is_none_or(|adapter| adapter.kind >= AdapterKind::Software);
     Ok(match choice {
         AdapterChoice::Reference => Box::new(Reference::new()),
+        AdapterChoice::Fastest if in_software() => Box::new(Reference::new()),
         choice => Box::new(Gpu::open(choice)?),
     })
 }

@@ -5,6 +5,7 @@ mod inverse;
 mod kernels;
 mod memory;
 mod readers;
+mod rendering;
 mod service;
 mod stages;
 
@@ -56,6 +57,8 @@ enum Part {
     Collection,
     /// The sculpted collection through the service's jobs, from upload to results
     Service,
+    /// Pictures of sixteen views compared with targets, and the gradient
+    Rendering,
 }
 
 impl Bench {
@@ -106,6 +109,9 @@ impl Bench {
             kernels::solves(&clock, finest);
             kernels::iteration(&clock);
             kernels::self_intersection(&clock);
+        }
+        if self.does(Part::Rendering) {
+            rendering::rendering(&clock)?;
         }
         Ok(())
     }

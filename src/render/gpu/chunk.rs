@@ -1,6 +1,6 @@
 use std::ops::Range;
 
-use super::layout::{EDGE_GRADIENT, STRIP, TRIANGLE_GRADIENT, filled_pixels};
+use super::layout::{EDGE_GRADIENT, GROUP, STRIP, TRIANGLE_GRADIENT, filled_pixels};
 use crate::render::connectivity::Connectivity;
 use crate::render::{RenderError, Target, View};
 
@@ -41,6 +41,11 @@ impl Room {
             size: [0, 1].map(|axis| self.size[axis].max(other.size[axis])),
             strips: self.strips.max(other.strips),
         }
+    }
+
+    /// Of views.
+    pub fn groups(&self) -> u64 {
+        self.views.div_ceil(GROUP.into())
     }
 
     /// Bytes of the largest buffer of pixels, where none has more than four numbers.

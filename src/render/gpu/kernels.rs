@@ -126,6 +126,7 @@ impl Kernels {
                     Marks,
                     Pulled,
                     Blends,
+                    Changed,
                     EdgeGradients,
                     Silhouettes,
                     SilhouetteCount
@@ -134,7 +135,18 @@ impl Kernels {
             backward: kernel!(
                 device,
                 "backward",
-                [Batch, Views, Normals, Albedo, Triangles, Corners, Colours, Pulled, TriangleGradients]
+                [
+                    Batch,
+                    Views,
+                    Normals,
+                    Albedo,
+                    Triangles,
+                    Corners,
+                    Colours,
+                    Pulled,
+                    Changed,
+                    TriangleGradients
+                ]
             ),
             gather: kernel!(
                 device,

@@ -28,6 +28,7 @@ pub enum Binding {
     Result,
     /// [`Self::Corners`], where vertices are drawn: to read alone.
     Drawn,
+    Changed,
 }
 
 /// Threads in a row of pixels.
@@ -35,6 +36,9 @@ pub const ROW: u32 = 64;
 
 /// Rows of pixels whose loss is summed by one row of threads.
 pub const STRIP: u32 = 16;
+
+/// Views of which a triangle's gradient is summed up by one thread.
+pub const GROUP: u32 = 4;
 
 /// Numbers of a triangle's gradient, with albedo.
 pub const TRIANGLE_GRADIENT: u64 = 27;

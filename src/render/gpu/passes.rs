@@ -2,7 +2,7 @@ use super::buffers::{Buffers, upload_targets};
 use super::chunk::{Room, chunks};
 use super::device::Device;
 use super::kernels::{Kernel, Kernels};
-use super::layout::{BatchUniform, Binding, ROW, Range, STRIP, ViewUniform, stride};
+use super::layout::{BatchUniform, Binding, GROUP, ROW, Range, STRIP, ViewUniform, stride};
 use crate::render::connectivity::Connectivity;
 use crate::render::{RenderError, Surface, Target};
 
@@ -206,7 +206,9 @@ impl Loaded {
             Pass::Loss => (&kernels.loss, Threads::Groups([1, rows.div_ceil(STRIP), views])),
             Pass::Blend => (&kernels.blend, Threads::OfSilhouettes),
             Pass::SilhouetteBackward => (&kernels.silhouette_backward, Threads::OfSilhouettes),
-            Pass::Backward => (&kernels.backward, Threads::Groups([groups(triangles), views, 1])),
+            Pass::Backward => {
+                (&kernels.backward, Threads::Groups([groups(triangles), views.div_ceil(GROUP), 1]))
+            }
             Pass::Gather => (&kernels.gather, Threads::Groups([groups(vertices), 1, 1])),
             Pass::Total => (&kernels.total, Threads::Groups([1, views, 1])),
             Pass::Raster | Pass::Picture => (&kernels.picture, Threads::Groups([columns, rows, views])),

@@ -2,6 +2,7 @@ use glam::Vec3A;
 
 use super::backward::{Pulled, VertexGradient};
 use super::corner::{Corner, project};
+use super::lamp::Lamp;
 use super::loss;
 use super::raster::Raster;
 use super::shade::{Looks, shade};
@@ -82,16 +83,16 @@ impl Frame {
         loss::unblend(&self.picture, &self.crossings, &mut self.unblended);
     }
 
-    fn pulled<'a>(&'a self, target: &'a Target, projection: &'a [[f32; 4]; 3]) -> Pulled<'a> {
-        Pulled { projection, light: &target.light, raster: &self.raster, gradient: &self.unblended }
+    fn pulled<'a>(&'a self, lamp: &'a Lamp, projection: &'a [[f32; 4]; 3]) -> Pulled<'a> {
+        Pulled { projection, lamp, raster: &self.raster, gradient: &self.unblended }
     }
 
     fn backward(&mut self, job: Job<'_>, gradient: &mut Vec<VertexGradient>) {
         let Job { mesh, surface, target, .. } = job;
         gradient.clear();
         gradient.resize(mesh.vertices, VertexGradient::default());
-        let projection = target.view.projection();
-        let pulled = self.pulled(target, &projection);
+        let (lamp, projection) = (Lamp::new(&target.light), target.view.projection());
+        let pulled = self.pulled(&lamp, &projection);
         for (id, &ends) in (1..).zip(&mesh.triangles) {
             let corners = ends.map(|end| &self.corners[end as usize]);
             let looks = Looks::new(surface, ends);
@@ -104,8 +105,8 @@ impl Frame {
     }
 
     fn silhouette_backward(&self, Job { mesh, target, .. }: Job<'_>, gradient: &mut [VertexGradient]) {
-        let projection = target.view.projection();
-        let pulled = self.pulled(target, &projection);
+        let (lamp, projection) = (Lamp::new(&target.light), target.view.projection());
+        let pulled = self.pulled(&lamp, &projection);
         for crossings in self.crossings.chunk_by(|(_, one), (_, next)| one.edge == next.edge) {
             let (mut sum, mut sum_along) = (0.0, 0.0);
             for (_, crossing) in crossings {

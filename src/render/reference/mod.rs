@@ -5,6 +5,7 @@ pub(super) mod backward;
 pub(super) mod corner;
 pub(super) mod frame;
 pub(super) mod gather;
+pub(super) mod lamp;
 pub(super) mod loss;
 pub(super) mod patch;
 pub(super) mod raster;

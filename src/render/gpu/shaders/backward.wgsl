@@ -1,26 +1,12 @@
-// What the pixels of each triangle in each view ask of its corners: 3 by (position, normal, albedo where there is any).
+// What the pixels of each triangle in each group of views ask of its corners: 3 by (position, normal, albedo where there is
+// any).
 @compute @workgroup_size(64)
 fn backward(@builtin(global_invocation_id) id: vec3<u32>, @builtin(workgroup_id) group: vec3<u32>) {
-    let view = group.y;
     let triangle = id.x;
     if triangle >= batch.triangles {
         return;
     }
     let ends = vec3<u32>(triangles[3u * triangle], triangles[3u * triangle + 1u], triangles[3u * triangle + 2u]);
-    let c0 = corner(view, ends.x);
-    let c1 = corner(view, ends.y);
-    let c2 = corner(view, ends.z);
-    let p0 = pixel_of(c0);
-    let p1 = pixel_of(c1);
-    let p2 = pixel_of(c2);
-    let area = cross2(p1 - p0, p2 - p0);
-    let stays = min(min(c0.w, c1.w), c2.w) > 0.0 && !(batch.closed != 0u && area > 0.0);
-    let size = views[view].size;
-    // Corners are rounded before they are drawn, by less than a 128th.
-    let low = max(ceil(min(p0, min(p1, p2)) - (0.5 + 0.0078125)), vec2<f32>(0.0));
-    let high = min(floor(max(p0, max(p1, p2)) - (0.5 - 0.0078125)), vec2<f32>(size) - 1.0);
-    let is_wide = abs(area) >= LEAST_AREA;
-
     let n0 = normals[ends.x].xyz;
     let n1 = normals[ends.y].xyz;
     let n2 = normals[ends.z].xyz;
@@ -32,26 +18,45 @@ fn backward(@builtin(global_invocation_id) id: vec3<u32>, @builtin(workgroup_id)
         r1 = albedo[ends.y].xyz;
         r2 = albedo[ends.z].xyz;
     }
-    let light = views[view].light;
-    let start = views[view].pixels;
-    let stride = views[view].stride;
-    let h0 = seen_from(c0, low);
-    let h1 = seen_from(c1, low);
-    let h2 = seen_from(c2, low);
-    let plane0 = cross(h1, h2);
-    let plane1 = cross(h2, h0);
-    let plane2 = cross(h0, h1);
-
-    var normal0 = vec3<f32>(0.0);
-    var normal1 = normal0;
-    var normal2 = normal0;
-    var albedo0 = normal0;
-    var albedo1 = normal0;
-    var albedo2 = normal0;
-    var moment0 = normal0;
-    var moment1 = normal0;
-    var moment2 = normal0;
-    if stays && all(low <= high) {
+    var position0 = vec3<f32>(0.0);
+    var position1 = position0;
+    var position2 = position0;
+    var normal0 = position0;
+    var normal1 = position0;
+    var normal2 = position0;
+    var albedo0 = position0;
+    var albedo1 = position0;
+    var albedo2 = position0;
+    let views_end = min((group.y + 1u) * GROUP, batch.views);
+    for (var view = group.y * GROUP; view < views_end; view++) {
+        let c0 = corner(view, ends.x);
+        let c1 = corner(view, ends.y);
+        let c2 = corner(view, ends.z);
+        let p0 = pixel_of(c0);
+        let p1 = pixel_of(c1);
+        let p2 = pixel_of(c2);
+        let area = cross2(p1 - p0, p2 - p0);
+        let stays = min(min(c0.w, c1.w), c2.w) > 0.0 && !(batch.closed != 0u && area > 0.0);
+        let size = views[view].size;
+        // Corners are rounded before they are drawn, by less than a 128th.
+        let low = max(ceil(min(p0, min(p1, p2)) - (0.5 + 0.0078125)), vec2<f32>(0.0));
+        let high = min(floor(max(p0, max(p1, p2)) - (0.5 - 0.0078125)), vec2<f32>(size) - 1.0);
+        if !stays || any(low > high) {
+            continue;
+        }
+        let is_wide = abs(area) >= LEAST_AREA;
+        let light = views[view].light;
+        let start = views[view].pixels;
+        let stride = views[view].stride;
+        let h0 = seen_from(c0, low);
+        let h1 = seen_from(c1, low);
+        let h2 = seen_from(c2, low);
+        let plane0 = cross(h1, h2);
+        let plane1 = cross(h2, h0);
+        let plane2 = cross(h0, h1);
+        var moment0 = vec3<f32>(0.0);
+        var moment1 = moment0;
+        var moment2 = moment0;
         let seen = f32(triangle + 1u);
         let first = vec2<u32>(low);
         let last = vec2<u32>(high);
@@ -61,8 +66,11 @@ fn backward(@builtin(global_invocation_id) id: vec3<u32>, @builtin(workgroup_id)
                 if colours[row + x].w != seen {
                     continue;
                 }
-                let at = 3u * (row + x);
-                let pull = vec3<f32>(pulled[at], pulled[at + 1u], pulled[at + 2u]);
+                let packed = pulled[row + x];
+                var pull = pull_of(view, packed);
+                if (packed & CHANGED) != 0u {
+                    pull = changed[row + x].xyz;
+                }
                 let spot = vec3<f32>(f32(x) - low.x, f32(y) - low.y, 1.0);
                 let a = vec3<f32>(dot(plane0, spot), dot(plane1, spot), dot(plane2, spot));
                 let inverse_sum = inverse_of(a.x + a.y + a.z);
@@ -92,12 +100,12 @@ fn backward(@builtin(global_invocation_id) id: vec3<u32>, @builtin(workgroup_id)
                 moment2 += spot * of_a.z;
             }
         }
+        position0 += position_gradient(view, low, cross(moment1, h2) + cross(h1, moment2));
+        position1 += position_gradient(view, low, cross(moment2, h0) + cross(h2, moment0));
+        position2 += position_gradient(view, low, cross(moment0, h1) + cross(h0, moment1));
     }
-    let position0 = position_gradient(view, low, cross(moment1, h2) + cross(h1, moment2));
-    let position1 = position_gradient(view, low, cross(moment2, h0) + cross(h2, moment0));
-    let position2 = position_gradient(view, low, cross(moment0, h1) + cross(h0, moment1));
     let width = select(6u, 9u, batch.with_albedo != 0u);
-    let at = 3u * width * (view * batch.triangles + triangle);
+    let at = 3u * width * (group.y * batch.triangles + triangle);
     put(at, position0);
     put(at + 3u, normal0);
     put(at + width, position1);

@@ -39,6 +39,8 @@ const RIM: u32 = 0xffffffffu;
 // Threads in a row of pixels, and rows in a strip, of which a thread sums up its own.
 const ROW: u32 = 64u;
 const STRIP: u32 = 16u;
+// Views of which a triangle's gradient is summed up by one thread.
+const GROUP: u32 = 4u;
 
 @group(0) @binding(0) var<uniform> batch: Batch;
 @group(0) @binding(1) var<storage, read> views: array<View>;
@@ -56,19 +58,22 @@ const STRIP: u32 = 16u;
 // What pixels' centres see, and one more than the triangle's index; 0 for none.
 @group(0) @binding(11) var<storage, read> colours: array<vec4<f32>>;
 @group(0) @binding(12) var<storage, read_write> marks: array<u32>;
-// The gradient with respect to the colours, three numbers a pixel.
-@group(0) @binding(13) var<storage, read_write> pulled: array<f32>;
+// The gradient with respect to the colours: each channel's sign plus one in two bits, then a bit where blending changes it,
+// which `changed` has, and in the upper half the weight.
+@group(0) @binding(13) var<storage, read_write> pulled: array<u32>;
 // The same with respect to blended colours, at pixels that are marked; pictures where they are asked for.
 @group(0) @binding(14) var<storage, read_write> blends: array<vec4<f32>>;
 @group(0) @binding(15) var<storage, read_write> strip_losses: array<f32>;
 @group(0) @binding(16) var<storage, read_write> triangle_gradients: array<f32>;
-@group(0) @binding(17) var<storage, read_write> edge_gradients: array<vec2<f32>>;
+@group(0) @binding(17) var<storage, read_write> edge_gradients: array<f32>;
 // What blending adds to the loss, for each edge in each view.
 @group(0) @binding(18) var<storage, read_write> edge_losses: array<f32>;
 // Edges that are silhouettes, as view * edges + edge, in any order.
 @group(0) @binding(19) var<storage, read> silhouettes: array<u32>;
 // Workgroups for them (x, y, z), and how many they are.
 @group(0) @binding(20) var<storage, read> silhouette_count: array<u32>;
+// The gradient where blending changes it.
+@group(0) @binding(23) var<storage, read_write> changed: array<vec4<f32>>;
 // 6 or 9 numbers a vertex, then ROW sums of each view's loss; batches add to those before.
 @group(0) @binding(21) var<storage, read_write> result: array<f32>;
 
@@ -76,10 +81,17 @@ fn corner(view: u32, vertex: u32) -> vec4<f32> {
     return corners[view * batch.vertices + vertex];
 }
 
-fn put_pulled(at: u32, value: vec3<f32>) {
-    pulled[3u * at] = value.x;
-    pulled[3u * at + 1u] = value.y;
-    pulled[3u * at + 2u] = value.z;
+const CHANGED: u32 = 64u;
+
+fn signs_of(difference: vec3<f32>) -> u32 {
+    let signs = vec3<u32>(sign(difference) + 1.0);
+    return signs.x | signs.y << 2u | signs.z << 4u;
+}
+
+// The gradient of which `pulled` has the signs and the weight.
+fn pull_of(view: u32, packed: u32) -> vec3<f32> {
+    let signs = vec3<f32>(vec3<u32>(packed, packed >> 2u, packed >> 4u) & vec3<u32>(3u)) - 1.0;
+    return signs * (f32(packed >> 16u) * (views[view].heaviest * batch.scale / 65535.0));
 }
 
 // A target's colour and weight.

@@ -1,4 +1,4 @@
-// The sum over triangles, edges and views at each vertex, in their order.
+// The sum over triangles and groups of views, then over edges and views, at each vertex, in their order.
 @compute @workgroup_size(64)
 fn gather(@builtin(global_invocation_id) id: vec3<u32>) {
     let vertex = id.x;
@@ -11,24 +11,22 @@ fn gather(@builtin(global_invocation_id) id: vec3<u32>) {
     var normal = position;
     var colour = position;
     let rows = batch.vertices + 1u;
-    for (var view = 0u; view < batch.views; view++) {
+    let groups = (batch.views + GROUP - 1u) / GROUP;
+    for (var group = 0u; group < groups; group++) {
         for (var k = corner_rows[vertex]; k < corner_rows[vertex + 1u]; k++) {
-            let at = width * (3u * view * batch.triangles + corner_rows[rows + k]);
+            let at = width * (3u * group * batch.triangles + corner_rows[rows + k]);
             position += triangle_gradient(at);
             normal += triangle_gradient(at + 3u);
             if with_albedo {
                 colour += triangle_gradient(at + 6u);
             }
         }
+    }
+    for (var view = 0u; view < batch.views; view++) {
         for (var k = end_rows[vertex]; k < end_rows[vertex + 1u]; k++) {
             let end = end_rows[rows + k];
-            let at = 3u * (view * batch.edges + end / 2u);
-            let middle = edge_gradients[at + 1u];
-            if end % 2u == 0u {
-                position += vec3<f32>(edge_gradients[at], middle.x);
-            } else {
-                position += vec3<f32>(middle.y, edge_gradients[at + 2u]);
-            }
+            let at = 6u * (view * batch.edges + end / 2u) + 3u * (end % 2u);
+            position += vec3<f32>(edge_gradients[at], edge_gradients[at + 1u], edge_gradients[at + 2u]);
         }
     }
     add(width * vertex, position);

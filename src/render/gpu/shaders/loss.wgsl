@@ -16,9 +16,10 @@ fn loss(@builtin(global_invocation_id) id: vec3<u32>, @builtin(workgroup_id) gro
     for (var y = first; y < end; y++) {
         for (var x = id.x; x < size.x; x += ROW) {
             let at = start + y * stride + x;
-            let wanted = wanted_at(view, wanted_start + y * size.x + x);
+            let place = wanted_start + y * size.x + x;
+            let wanted = wanted_at(view, place);
             let difference = colours[at].xyz - wanted.xyz;
-            put_pulled(at, sign(difference) * (wanted.w * batch.scale));
+            pulled[at] = signs_of(difference) | (targets[place].y & 0xffff0000u);
             let apart = abs(difference);
             sum += (apart.x + apart.y + apart.z) * wanted.w;
         }

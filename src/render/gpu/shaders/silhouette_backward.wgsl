@@ -27,7 +27,8 @@ fn silhouette_backward(@builtin(global_invocation_id) id: vec3<u32>) {
             let place = select(c.first, c.second, i % 2u == 1u);
             let pixel = vec2<u32>(place % stride, place / stride);
             if is_first(view, pixel, s.axis + 2u * (i % 2u)) {
-                put_pulled(start + place, unblended(view, pixel));
+                changed[start + place] = vec4<f32>(unblended(view, pixel), 0.0);
+                pulled[start + place] |= CHANGED;
             }
         }
     }
@@ -35,9 +36,14 @@ fn silhouette_backward(@builtin(global_invocation_id) id: vec3<u32>) {
     let slope = (s.b.x - s.a.x) / (s.b.y - s.a.y);
     let a = end_gradient(view, corner(view, ends.x), s.axis, sum.x - sum.y, slope);
     let b = end_gradient(view, corner(view, ends.y), s.axis, sum.y, slope);
-    edge_gradients[3u * at] = a.xy;
-    edge_gradients[3u * at + 1u] = vec2<f32>(a.z, b.x);
-    edge_gradients[3u * at + 2u] = b.yz;
+    put_end(6u * at, a);
+    put_end(6u * at + 3u, b);
+}
+
+fn put_end(at: u32, value: vec3<f32>) {
+    edge_gradients[at] = value.x;
+    edge_gradients[at + 1u] = value.y;
+    edge_gradients[at + 2u] = value.z;
 }
 
 fn end_gradient(view: u32, corner: vec4<f32>, axis: u32, across: f32, slope: f32) -> vec3<f32> {

@@ -1,58 +1,10 @@
-//! Each kernel against its twin of the reference, on whatever adapter there is.
+//! Each kernel against its twin of the reference.
 
 use super::*;
-use crate::numeric::Random;
-use crate::render::reference::Reference;
 use crate::render::reference::backward::{Pulled, VertexGradient};
 use crate::render::reference::frame::{Frame, Job};
+use crate::render::reference::lamp::Lamp;
 use crate::render::reference::shade::Looks;
-use crate::render::scenes::{Scene as Shape, targets, views};
-
-/// The best adapter; without one the tests that want it say so, or fail if one is required.
-fn gpu() -> Option<Gpu> {
-    match Gpu::open(&AdapterChoice::Best) {
-        Ok(gpu) => Some(gpu),
-        Err(error) if std::env::var_os("ONEMESH_REQUIRE_GPU").is_some() => panic!("{error}"),
-        Err(error) => {
-            eprintln!("skipped: {error}");
-            None
-        }
-    }
-}
-
-fn shapes() -> [Shape; 3] {
-    [Shape::bumpy(3), Shape::eared(), Shape::bowl()]
-}
-
-/// Pictures of several sizes.
-fn mixed_targets() -> Vec<Target> {
-    let sizes = [[96, 96], [65, 40], [128, 90]];
-    let mut random = Random::new(1);
-    let mut all = Vec::new();
-    for (i, size) in sizes.into_iter().enumerate() {
-        all.push(targets(&views(3, size), &mut random).remove(i));
-    }
-    all
-}
-
-fn prepared(mut renderer: impl Renderer, shape: &Shape, targets: &[Target]) -> impl Renderer {
-    renderer.prepare(MeshLayout::of(&shape.topology), targets).unwrap();
-    renderer
-}
-
-/// |a - b| / |b|.
-fn difference<'a>(a: impl Iterator<Item = &'a f32>, b: impl Iterator<Item = &'a f32>) -> f64 {
-    let (mut squares, mut apart) = (0.0, 0.0);
-    for (&a, &b) in a.zip(b) {
-        squares += f64::from(b).powi(2);
-        apart += f64::from(a - b).powi(2);
-    }
-    (apart / squares.max(1e-30)).sqrt()
-}
-
-fn flat(vectors: &[Vec3A]) -> Vec<f32> {
-    vectors.iter().flat_map(|vector| vector.to_array()).collect()
-}
 
 /// The numbers of a buffer after the passes of a loss over all targets.
 struct Ran<'a> {
@@ -102,6 +54,25 @@ impl<'a> Ran<'a> {
             pixels = others;
         }
         views
+    }
+
+    /// The gradient with respect to each pixel's colour in each view.
+    fn pulled(&mut self) -> Vec<Vec<Vec3A>> {
+        let (packed, changed) = (self.pixels::<1>(Binding::Pulled), self.pixels::<4>(Binding::Changed));
+        let scale = self.scale();
+        let pull = |([packed], changed): (&[f32; 1], &[f32; 4])| {
+            let packed = packed.to_bits();
+            let signs = [0, 2, 4].map(|shift| (packed >> shift & 3) as f32 - 1.0);
+            // The heaviest of the tests' weights is one.
+            let weight = (packed >> 16) as f32 / 65535.0;
+            let is_changed = packed & 64 != 0;
+            if is_changed { Vec3A::from_slice(changed) } else { Vec3A::from_array(signs) * (weight * scale) }
+        };
+        packed
+            .iter()
+            .zip(&changed)
+            .map(|(packed, changed)| packed.iter().zip(changed).map(pull).collect())
+            .collect()
     }
 
     /// What each pixel of each view sees.
@@ -202,10 +173,9 @@ fn silhouette() {
 fn loss_and_blend() {
     for_all(|mut ran| {
         // With respect to the blended colours where some are blended, and to all before they are.
-        let (pulled, blends) = (ran.pixels::<3>(Binding::Pulled), ran.pixels::<4>(Binding::Blends));
+        let (pulled, blends) = (ran.pulled(), ran.pixels::<4>(Binding::Blends));
         for ((pulled, blends), (frame, _)) in pulled.iter().zip(&blends).zip(ran.twins()) {
-            let pulled: Vec<Vec3A> = pulled.iter().map(|pixel| Vec3A::from_slice(pixel)).collect();
-            let error = difference(flat(&pulled).iter(), flat(&frame.unblended).iter());
+            let error = difference(flat(pulled).iter(), flat(&frame.unblended).iter());
             assert!(error < 0.01, "{error}");
             let crossed = frame.crossings.iter().map(|(_, crossing)| crossing.blend().0);
             let (found, wanted): (Vec<Vec3A>, Vec<Vec3A>) =
@@ -234,33 +204,36 @@ fn backward() {
     for_all(|mut ran| {
         let triangles = &ran.shape.topology.triangles;
         let width = if ran.with_albedo { 9 } else { 6 };
-        let gradients = ran.read(Binding::TriangleGradients, 3 * width * triangles.len() * ran.targets.len());
+        // One group of views.
+        assert!(ran.targets.len() <= layout::GROUP as usize);
+        let gradients = ran.read(Binding::TriangleGradients, 3 * width * triangles.len());
         let surface = ran.surface();
         let closed = !ran.shape.topology.on_rim.contains(&true);
-        let mut twin = Vec::new();
+        let mut twin = vec![0.0; gradients.len()];
         // But for triangles one of whose pixels is not the same: of a sliver it asks much.
-        let mut others = vec![false; triangles.len() * ran.targets.len()];
-        let (ids, pulled) = (ran.ids(), ran.pixels::<3>(Binding::Pulled));
+        let mut others = vec![false; triangles.len()];
+        let (ids, pulled) = (ran.ids(), ran.pulled());
         for (view, (target, (frame, _))) in ran.targets.iter().zip(ran.twins()).enumerate() {
             for (at, (&one, &other)) in ids[view].iter().zip(&frame.raster.ids).enumerate() {
-                let apart = Vec3A::from_slice(&pulled[view][at]).distance(frame.unblended[at]);
+                let apart = pulled[view][at].distance(frame.unblended[at]);
                 let differ = one != other || apart > 1e-3 * ran.scale();
                 for id in [one, other].into_iter().filter(|&id| differ && id != 0) {
-                    others[view * triangles.len() + id as usize - 1] = true;
+                    others[id as usize - 1] = true;
                 }
             }
             let projection = target.view.projection();
             let pulled = Pulled {
                 projection: &projection,
-                light: &target.light,
+                lamp: &Lamp::new(&target.light),
                 raster: &frame.raster,
                 gradient: &frame.unblended,
             };
-            for (id, &ends) in (1..).zip(triangles) {
+            for ((id, &ends), sums) in (1..).zip(triangles).zip(twin.chunks_exact_mut(3 * width)) {
                 let corners = ends.map(|end| &frame.corners[end as usize]);
                 let parts = pulled.triangle(id, corners, &Looks::new(&surface, ends), closed);
-                for VertexGradient { position, normal, albedo } in parts.unwrap_or_default() {
-                    twin.extend(&flat(&[position, normal, albedo])[..width]);
+                let parts = parts.unwrap_or_default().map(|part| [part.position, part.normal, part.albedo]);
+                for (sums, part) in sums.chunks_exact_mut(width).zip(parts) {
+                    sums.iter_mut().zip(flat(&part)).for_each(|(sum, number)| *sum += number);
                 }
             }
         }
@@ -290,7 +263,7 @@ fn silhouette_backward() {
             let projection = target.view.projection();
             let pulled = Pulled {
                 projection: &projection,
-                light: &target.light,
+                lamp: &Lamp::new(&target.light),
                 raster: &frame.raster,
                 gradient: &frame.unblended,
             };
@@ -313,7 +286,7 @@ fn gather() {
         let width = if ran.with_albedo { 9 } else { 6 };
         let sums = ran.read(Binding::Result, width * vertices);
         let [triangles, edges] = [&ran.shape.topology.triangles.len(), &ran.shape.topology.edges.len()];
-        let of_triangles = ran.read(Binding::TriangleGradients, 3 * width * triangles * ran.targets.len());
+        let of_triangles = ran.read(Binding::TriangleGradients, 3 * width * triangles);
         let of_edges = ran.read(Binding::EdgeGradients, 6 * edges * ran.targets.len());
         let mut twin = vec![0f64; width * vertices];
         let mut add = |vertex: u32, numbers: &[f32]| {
@@ -327,117 +300,4 @@ fn gather() {
         let twin: Vec<f32> = twin.iter().map(|&sum| sum as f32).collect();
         assert!(difference(sums.iter(), twin.iter()) < 1e-5);
     });
-}
-
-/// Loss and gradient.
-fn outcome(renderer: &mut impl Renderer, shape: &Shape, listed: &[usize]) -> (f64, RenderGradient) {
-    let mut gradient = RenderGradient::default();
-    let value = renderer.loss(&shape.surface(), listed, &mut gradient).unwrap();
-    (value, gradient)
-}
-
-fn assert_alike((value, gradient): &(f64, RenderGradient), twin: &(f64, RenderGradient)) {
-    assert!((value / twin.0 - 1.0).abs() < 1e-5, "{value} {}", twin.0);
-    let error = |of: fn(&RenderGradient) -> Vec<f32>| difference(of(gradient).iter(), of(&twin.1).iter());
-    let errors = [
-        error(|gradient| flat(&gradient.positions)),
-        error(|gradient| flat(&gradient.normals)),
-        error(|gradient| gradient.albedo.as_flattened().to_vec()),
-    ];
-    assert!(errors.iter().all(|&error| error < 0.01), "{errors:?}");
-}
-
-#[test]
-fn whole_losses_and_pictures_are_as_the_reference_s() {
-    let Some(mut gpu) = gpu() else { return };
-    let targets = mixed_targets();
-    for shape in shapes() {
-        gpu.prepare(MeshLayout::of(&shape.topology), &targets).unwrap();
-        let mut reference = prepared(Reference::new(), &shape, &targets);
-        for listed in [&[0, 1, 2][..], &[2], &[1, 0], &[0, 0, 2, 1, 1, 2]] {
-            assert_alike(&outcome(&mut gpu, &shape, listed), &outcome(&mut reference, &shape, listed));
-        }
-        for target in 0..targets.len() {
-            let [one, other] = [&mut gpu as &mut dyn Renderer, &mut reference]
-                .map(|renderer| renderer.picture(&shape.surface(), target).unwrap());
-            assert_eq!(one.size, other.size);
-            let apart = difference(one.colours.as_flattened().iter(), other.colours.as_flattened().iter());
-            let others = one.covered.iter().zip(&other.covered).filter(|(one, other)| one != other).count();
-            assert!(apart < 0.01 && others < 5, "{apart} {others}");
-        }
-    }
-}
-
-#[test]
-fn other_lights_are_seen_and_the_same_input_gives_the_same_bytes() {
-    let Some(mut gpu) = gpu() else { return };
-    let (shape, mut targets) = (Shape::eared(), mixed_targets());
-    gpu.prepare(MeshLayout::of(&shape.topology), &targets).unwrap();
-    let first = outcome(&mut gpu, &shape, &[0, 1, 2]);
-    gpu.set_lights(&[Light::uniform([0.5; 3]); 3]).unwrap();
-    let other = outcome(&mut gpu, &shape, &[0, 1, 2]);
-    assert_ne!(first, other);
-    gpu.set_lights(&targets.iter().map(|target| target.light).collect::<Vec<_>>()).unwrap();
-    for _ in 0..3 {
-        assert_eq!(outcome(&mut gpu, &shape, &[0, 1, 2]), first);
-    }
-    targets.iter_mut().for_each(|target| target.light = Light::uniform([0.5; 3]));
-    let mut reference = prepared(Reference::new(), &shape, &targets);
-    assert_alike(&other, &outcome(&mut reference, &shape, &[0, 1, 2]));
-    assert_eq!(gpu.set_lights(&[]), Err(RenderError::Lights { found: 0, targets: 3 }));
-}
-
-#[test]
-fn a_lost_device_is_replaced() {
-    let Some(mut gpu) = gpu() else { return };
-    let (shape, targets) = (Shape::bowl(), mixed_targets());
-    gpu.prepare(MeshLayout::of(&shape.topology), &targets).unwrap();
-    let before = outcome(&mut gpu, &shape, &[0, 1]);
-    gpu.device.device.destroy();
-    assert_eq!(outcome(&mut gpu, &shape, &[0, 1]), before);
-    gpu.device.device.destroy();
-    assert!(gpu.picture(&shape.surface(), 1).is_ok());
-}
-
-#[test]
-fn a_failure_of_the_driver_is_an_error_once() {
-    let Some(gpu) = gpu() else { return };
-    buffers::buffer(&gpu.device.device, wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::INDEX, 1);
-    let error = gpu.device.check().unwrap_err();
-    assert!(matches!(error, RenderError::Device { .. }), "{error}");
-    assert_eq!(gpu.device.check(), Ok(()));
-}
-
-#[test]
-fn what_is_too_large_is_cut_or_refused() {
-    let Some(mut gpu) = gpu() else { return };
-    let (shape, targets) = (Shape::eared(), mixed_targets());
-    let mesh = Connectivity::new(MeshLayout::of(&shape.topology));
-    let mut limits = gpu.device.device.limits();
-    // Room for one view's gradient, and little more.
-    limits.max_storage_buffer_binding_size = 4 * 27 * mesh.triangles.len() as u64 * 3 / 2;
-    let cut = chunk::chunks(&targets, &mesh, &limits).unwrap();
-    assert_eq!(cut.iter().map(|(range, _)| range.clone()).collect::<Vec<_>>(), [0..1, 1..2, 2..3]);
-    gpu.prepare(MeshLayout::of(&shape.topology), &targets).unwrap();
-    let whole = outcome(&mut gpu, &shape, &[2, 0, 1]);
-    let scene = gpu.scene.as_mut().unwrap();
-    scene.loaded = Loaded::new(&gpu.device, &gpu.kernels, &mesh, &targets, &limits).unwrap();
-    assert_alike(&outcome(&mut gpu, &shape, &[2, 0, 1]), &whole);
-
-    limits.max_storage_buffer_binding_size = 1000;
-    let error = chunk::chunks(&targets, &mesh, &limits).unwrap_err();
-    assert!(error.to_string().contains("simplify the mesh"), "{error}");
-    limits.max_storage_buffer_binding_size = 1 << 30;
-    limits.max_texture_dimension_2d = 100;
-    let error = chunk::chunks(&targets, &mesh, &limits).unwrap_err();
-    assert!(error.to_string().contains("target 2 in pixels is 128"), "{error}");
-}
-
-#[test]
-fn adapters_are_chosen_by_name() {
-    let Some(gpu) = gpu() else { return };
-    let name = gpu.adapter().name.to_uppercase();
-    assert_eq!(Gpu::open(&AdapterChoice::Named(name)).unwrap().adapter(), gpu.adapter());
-    let error = Gpu::open(&AdapterChoice::Named("no such card".into())).unwrap_err();
-    assert!(error.to_string().contains(&gpu.adapter().name), "{error}");
 }
