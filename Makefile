@@ -29,9 +29,10 @@ templates: rust
 	cargo run --release --locked -- demo --seed 7 --count 12 --set from_head=false -o target/head
 	cp target/head/result/template.frozen.glb templates/head68.glb
 
-# The README's pictures of what else goes in.
+# The README's pictures of what else goes in, and of inversions.
 pictures: rust
 	cargo run --release --locked --example pictures
+	cargo run --release --locked --example inversions
 
 # The service against its own OpenAPI document, with many generated requests.
 contract: rust schemathesis

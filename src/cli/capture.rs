@@ -27,7 +27,7 @@ pub struct Capture {
     /// Samples along a pixel's side: 1, 2, 4 or 8
     #[arg(long, default_value_t = 4, value_name = "N")]
     samples: u32,
-    /// What draws: `best`, `reference` (this program, on the processor), or part of an adapter's name
+    /// What draws: `best`, `fastest`, `reference` (this program, on the processor), or part of an adapter's name
     #[arg(long, default_value = "best", value_name = "NAME")]
     adapter: String,
 }

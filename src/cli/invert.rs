@@ -39,7 +39,7 @@ pub struct Invert {
     /// Sets one parameter by its dotted name, as in `levels.0.iterations=500`; may be repeated
     #[arg(long, value_name = "NAME=VALUE")]
     set: Vec<String>,
-    /// What draws: `best`, `reference` (this program, on the processor), or part of an adapter's name
+    /// What draws: `best`, `fastest`, `reference` (this program, on the processor), or part of an adapter's name
     #[arg(long, default_value = "best", value_name = "NAME")]
     adapter: String,
 }

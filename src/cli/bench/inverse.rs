@@ -33,7 +33,7 @@ pub struct Inverse {
     /// Vertices of the spheres
     #[arg(long, default_values_t = [2562, 10242], value_name = "N", requires = "inverse")]
     spheres: Vec<usize>,
-    /// The adapter that draws: `best`, `reference` or part of a name
+    /// The adapter that draws: `best`, `fastest`, `reference` or part of a name
     #[arg(long, default_value = "best", value_name = "NAME", requires = "inverse")]
     adapter: String,
     /// Iterations of the `paper` preset in place of its own
