@@ -27,7 +27,7 @@ impl Serve {
             print!("{}", config.to_toml());
             return Ok(());
         }
-        logging::start(&config.log)?;
+        let _logging = logging::start(&config.log)?;
         let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().build();
         runtime.context("no threads can be started")?.block_on(async {
             let service = Service::open(config).await?;
