@@ -32,7 +32,7 @@ impl Serve {
         runtime.context("no threads can be started")?.block_on(async {
             let service = Service::open(config).await?;
             println!("listening on http://{}", service.address());
-            service.run(stop()).await?;
+            service.run(stop()).await;
             Ok(())
         })
     }

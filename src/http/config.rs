@@ -37,6 +37,8 @@ pub struct ServerConfig {
     pub listen: SocketAddr,
     /// Whether API keys are needed.
     pub keys: KeyPolicy,
+    /// Seconds that a client may take to send the head of a request, from the connection or the answer before on.
+    pub header_seconds: u64,
     /// Seconds that a client may take to send the next piece of a body.
     pub body_idle_seconds: u64,
     /// Seconds that requests under way have to end when the server does.
@@ -163,7 +165,8 @@ pub enum LogFormat {
 impl Default for ServerConfig {
     fn default() -> Self {
         let listen = SocketAddr::from(([127, 0, 0, 1], 8080));
-        Self { listen, keys: KeyPolicy::Auto, body_idle_seconds: 60, shutdown_seconds: 20 }
+        let keys = KeyPolicy::Auto;
+        Self { listen, keys, header_seconds: 30, body_idle_seconds: 60, shutdown_seconds: 20 }
     }
 }
 

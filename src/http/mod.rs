@@ -5,6 +5,7 @@ mod auth;
 mod blob_answer;
 pub mod config;
 mod config_source;
+mod connections;
 mod document;
 mod extract;
 mod idempotency;

@@ -34,7 +34,9 @@ impl Compute {
     ) -> Result<T, Panicked> {
         let (send, receive) = oneshot::channel();
         let pool = self.pool.read().unwrap_or_else(PoisonError::into_inner).clone();
+        let span = tracing::Span::current();
         pool.spawn(move || {
+            let _within = span.entered();
             let result = catch_unwind(AssertUnwindSafe(work)).map_err(|panic| Panicked(message(&*panic)));
             // Nobody may wait for it any more.
             let _ = send.send(result);

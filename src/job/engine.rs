@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 
 use sqlx::{Row, Sqlite, Transaction};
 use tokio::sync::{Notify, broadcast, watch};
+use tracing::{Instrument, info_span};
 
 use super::blobs::{Blobs, Kept};
 use super::cache::Cache;
@@ -20,13 +21,15 @@ use super::record::{Fractions, add_event};
 use super::registration::Problem;
 use super::settings::JobSettings;
 use super::store_error::StoreError;
-use super::work::{Fault, Produced};
+use super::work::{Decided, Fault, Produced};
 use super::{queue, sweep};
 
 /// How often a running step is looked after: whether it is to stop, how far it is.
 const LOOK: Duration = Duration::from_millis(200);
 /// How often its progress is told.
 const TELL: Duration = Duration::from_secs(1);
+/// Residuals that are kept until somebody asks for them.
+const RESIDUALS: usize = 10_000;
 /// How long a step that is to stop may take to do so.
 const GRACE: Duration = Duration::from_secs(60);
 
@@ -51,6 +54,8 @@ pub(super) struct Engine {
     pub closing: watch::Sender<bool>,
     /// Seconds and number of the steps done, by stage.
     pub spent: Mutex<BTreeMap<&'static str, (u64, f64)>>,
+    /// Residuals of the latest results that nobody has asked for yet.
+    pub residuals: Mutex<Vec<f64>>,
     /// Workers that go from step to step.
     pub busy: AtomicUsize,
 }
@@ -61,6 +66,17 @@ enum Outcome {
     Failed(Problem),
     Stopped,
     Store(StoreError),
+}
+
+impl Outcome {
+    fn name(&self) -> &'static str {
+        match self {
+            Self::Done(_) => "done",
+            Self::Failed(_) => "failed",
+            Self::Stopped => "stopped",
+            Self::Store(_) => "store failed",
+        }
+    }
 }
 
 pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
@@ -90,6 +106,7 @@ impl Engine {
             finished: watch::Sender::new(0),
             closing: watch::Sender::new(false),
             spent: Mutex::default(),
+            residuals: Mutex::default(),
             busy: AtomicUsize::new(0),
         })
     }
@@ -118,9 +135,16 @@ impl Engine {
         let guard = Running { engine: self, step: claim.step };
         tx.commit().await?;
         self.publish(changed);
-        let start = Instant::now();
-        let outcome = self.run(&claim, control).await;
-        let ended = self.end(&claim, outcome, start.elapsed().as_secs_f64()).await;
+        let stage = claim.stage().name();
+        let span = info_span!("step", registration = claim.id, stage, place = claim.place, run = claim.run);
+        let work = async {
+            let start = Instant::now();
+            let outcome = self.run(&claim, control).await;
+            let seconds = start.elapsed().as_secs_f64();
+            tracing::debug!(seconds, outcome = outcome.name(), "step ended");
+            self.end(&claim, outcome, seconds).await
+        };
+        let ended = work.instrument(span).await;
         drop(guard);
         ended.map(|()| true)
     }
@@ -212,12 +236,7 @@ impl Engine {
         match outcome {
             Outcome::Done(produced) => self.keep(claim, produced, seconds).await,
             Outcome::Failed(problem) => {
-                tracing::warn!(
-                    step = claim.stage().name(),
-                    code = problem.code,
-                    detail = problem.detail,
-                    "step failed"
-                );
+                tracing::warn!(code = problem.code, detail = problem.detail, "step failed");
                 let mut changed = Changed::default();
                 let mut tx = self.database.begin_write().await?;
                 graph::fail(&mut tx, claim, &problem, seconds, &mut changed).await?;
@@ -249,6 +268,10 @@ impl Engine {
             records.push((file, kept.info.digest, kept.info.size));
             held.push(kept);
         }
+        let residual = match &decided {
+            Decided::Judgement(judgement) => judgement.residual,
+            _ => None,
+        };
         let mut changed = Changed::default();
         let mut tx = self.database.begin_write().await?;
         let done = Done { output: output_digest, files: records, decided, seconds };
@@ -257,6 +280,10 @@ impl Engine {
             let mut spent = lock(&self.spent);
             let (count, sum) = spent.entry(claim.stage().name()).or_default();
             (*count, *sum) = (*count + 1, *sum + seconds);
+            drop(spent);
+            let mut residuals = lock(&self.residuals);
+            let room = residuals.len() < RESIDUALS;
+            residuals.extend(residual.filter(|_| room));
         }
         graph::end_if_too_long(&mut tx, claim.registration, self.settings.job_time, &mut changed).await?;
         self.commit(tx, changed).await?;
@@ -264,7 +291,7 @@ impl Engine {
         drop(held);
         if !own {
             // The registration ended meanwhile: nobody will name these.
-            sweep::collect(self, digests).await?;
+            sweep::collect(&self.database, &self.blobs, digests).await?;
         }
         Ok(())
     }
@@ -285,7 +312,7 @@ impl Engine {
                 return Err(error);
             }
         };
-        tracing::error!(%error, step = claim.stage().name(), again, "a step's inputs are damaged");
+        tracing::error!(%error, again, "a step's inputs are damaged");
         if !again {
             let problem = Problem { code: "storage".to_owned(), detail: error.to_string() };
             graph::fail(&mut tx, claim, &problem, 0.0, &mut changed).await?;
@@ -302,9 +329,7 @@ impl Engine {
         let dropped = changed.dropped.clone();
         self.cache.forget(&dropped);
         self.publish(changed);
-        if let Err(error) = sweep::collect(self, dropped).await {
-            tracing::warn!(%error, "what is no longer needed cannot be deleted now");
-        }
+        sweep::collect_soon(&self.database, &self.blobs, dropped).await;
         Ok(())
     }
 

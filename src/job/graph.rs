@@ -29,6 +29,8 @@ pub(super) struct Claim {
     pub step: i64,
     /// Counts its runs: a run that was taken from it cannot end it.
     pub run: i64,
+    /// The registration's id, for those who read logs.
+    pub id: String,
     pub registration: i64,
     /// Its number among the stages.
     pub number: i64,
@@ -79,7 +81,7 @@ pub(super) async fn claim(
     changed: &mut Changed,
     others_run: bool,
 ) -> Result<Option<Claim>, StoreError> {
-    let whose = "SELECT r.sequence, r.status, r.stage, r.stages FROM registration r
+    let whose = "SELECT r.sequence, r.id, r.status, r.stage, r.stages FROM registration r
         WHERE r.status IN ('queued', 'running')
             AND EXISTS (SELECT 1 FROM step s WHERE s.registration = r.sequence AND s.state = 'ready' AND s.crashes < ?)
         ORDER BY r.priority DESC, r.turn, r.sequence LIMIT 1";
@@ -112,7 +114,8 @@ pub(super) async fn claim(
         WHERE registration = ?3 AND place = ?4";
     sqlx::query(child).bind(now()).bind(stage).bind(registration).bind(place).execute(&mut *tx).await?;
     let alone = crashes >= SUSPECT;
-    Ok(Some(Claim { step: id, run, registration, number: stage, place, stages, alone }))
+    let (step, id) = (id, row.try_get("id")?);
+    Ok(Some(Claim { step, run, id, registration, number: stage, place, stages, alone }))
 }
 
 /// Ends a step that did its work, and begins what follows. Says whether it was still its own.
@@ -144,7 +147,7 @@ pub(super) async fn finish(
                 fail_child(tx, claim.registration, place, &problem, changed).await?;
             }
         }
-        Decided::Verdict(verdict) => end_child(tx, claim, verdict, changed).await?,
+        Decided::Judgement(judgement) => end_child(tx, claim, judgement.verdict, changed).await?,
     }
     follow(tx, claim, &stages, changed).await?;
     Ok(true)
@@ -364,11 +367,12 @@ pub(super) async fn fail_crashed(
     most: u32,
     changed: &mut Changed,
 ) -> Result<(), StoreError> {
-    let crashed = "SELECT s.id, s.runs, s.registration, s.stage, s.place, r.stages FROM step s
+    let crashed = "SELECT s.id AS step, s.runs, s.registration, s.stage, s.place, r.id, r.stages FROM step s
         JOIN registration r ON r.sequence = s.registration WHERE s.state = 'ready' AND s.crashes >= ?";
     for row in sqlx::query(crashed).bind(most).fetch_all(&mut *tx).await? {
         let claim = Claim {
-            step: row.try_get("id")?,
+            step: row.try_get("step")?,
+            id: row.try_get("id")?,
             run: row.try_get("runs")?,
             registration: row.try_get("registration")?,
             number: row.try_get("stage")?,

@@ -177,12 +177,13 @@ impl Jobs {
         to: &RegistrationId,
         scans: Vec<NewMember>,
         owner: Option<String>,
+        dedupe_key: Option<String>,
     ) -> Result<Registration, JobError> {
         let earlier = self.get(to).await?;
         let template = TemplateChoice::Of(to.clone());
         let (name, priority) = (earlier.name, earlier.priority);
-        self.submit(NewRegistration { name, priority, scans, template, owner, ..NewRegistration::default() })
-            .await
+        let usual = NewRegistration::default();
+        self.submit(NewRegistration { name, priority, scans, template, owner, dedupe_key, ..usual }).await
     }
 
     /// How it stands.
@@ -327,6 +328,12 @@ impl Jobs {
         })
     }
 
+    /// The residuals of results since this was last asked, for metrics: each scan's mean distance from its result, in the
+    /// scan's radius.
+    pub fn take_residuals(&self) -> Vec<f64> {
+        std::mem::take(&mut lock(&self.engine.residuals))
+    }
+
     /// Counts registrations that came to an end, for those who tell of it.
     pub fn finished(&self) -> watch::Receiver<u64> {
         self.engine.finished.subscribe()
@@ -369,7 +376,8 @@ impl Jobs {
             },
             TemplateChoice::Of(id) => {
                 let frozen = self.result(id, &ResultFile::Template).await?;
-                Ok(Some(TemplateParts { kind: MeshKind::Glb, mesh: frozen.digest, landmarks: None }))
+                let mesh = frozen.digest;
+                Ok(Some(TemplateParts { kind: MeshKind::Glb, mesh, landmarks: None, mask: None }))
             }
         }
     }

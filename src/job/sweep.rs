@@ -5,9 +5,12 @@ use std::collections::HashSet;
 use futures_util::TryStreamExt;
 use sqlx::sqlite::SqliteConnection;
 
+use super::blobs::Blobs;
 use super::clock::now;
+use super::database::Database;
 use super::engine::Engine;
 use super::graph::{self, Changed};
+use super::record::json;
 use super::registration::Status;
 use super::store_error::StoreError;
 use crate::formats::Sha256;
@@ -19,24 +22,45 @@ const AT_ONCE: usize = 64;
 ///
 /// # Errors
 /// [`StoreError`].
-pub(super) async fn collect(engine: &Engine, candidates: Vec<Sha256>) -> Result<usize, StoreError> {
+pub(super) async fn collect(
+    database: &Database,
+    blobs: &Blobs,
+    candidates: Vec<Sha256>,
+) -> Result<usize, StoreError> {
     let mut deleted = 0;
     for some in candidates.chunks(AT_ONCE) {
         // In a transaction that may write: records of a blob are made by such ones, while the blob is pinned.
-        let mut tx = engine.database.begin_write().await?;
-        let named = named(&mut tx).await?;
+        let mut tx = database.begin_write().await?;
+        let named = named_of(&mut tx, some).await?;
         for digest in some.iter().filter(|digest| !named.contains(*digest)) {
-            deleted += usize::from(engine.blobs.remove_unpinned(*digest).await?);
+            deleted += usize::from(blobs.remove_unpinned(*digest).await?);
         }
         tx.rollback().await?;
     }
     Ok(deleted)
 }
 
+/// Those of some blobs that a record names.
+async fn named_of(tx: &mut SqliteConnection, some: &[Sha256]) -> Result<HashSet<Sha256>, StoreError> {
+    let query =
+        "SELECT digest FROM (SELECT digest FROM uploaded_blob UNION SELECT digest FROM registered_blob)
+        WHERE digest IN (SELECT value FROM json_each(?))";
+    let some: Vec<String> = some.iter().map(ToString::to_string).collect();
+    let digests: Vec<String> = sqlx::query_scalar(query).bind(json(&some)).fetch_all(tx).await?;
+    Ok(digests.iter().filter_map(|digest| digest.parse().ok()).collect())
+}
+
 async fn named(tx: &mut SqliteConnection) -> Result<HashSet<Sha256>, StoreError> {
     let query = "SELECT digest FROM uploaded_blob UNION SELECT digest FROM registered_blob";
     let digests: Vec<String> = sqlx::query_scalar(query).fetch_all(tx).await?;
     Ok(digests.iter().filter_map(|digest| digest.parse().ok()).collect())
+}
+
+/// The same of blobs whose record has just gone: what fails is deleted later.
+pub(super) async fn collect_soon(database: &Database, blobs: &Blobs, candidates: Vec<Sha256>) {
+    if let Err(error) = collect(database, blobs, candidates).await {
+        tracing::warn!(%error, "what is no longer needed cannot be deleted now");
+    }
 }
 
 /// Deletes every blob that no record names, as a run that ended in the middle leaves them.
@@ -48,7 +72,8 @@ pub(super) async fn collect_all(engine: &Engine) -> Result<usize, StoreError> {
     let mut connection = engine.database.reader().acquire().await?;
     let named = named(&mut connection).await?;
     drop(connection);
-    collect(engine, all.into_iter().filter(|digest| !named.contains(digest)).collect()).await
+    let unnamed = all.into_iter().filter(|digest| !named.contains(digest)).collect();
+    collect(&engine.database, &engine.blobs, unnamed).await
 }
 
 /// Deletes registrations and scans whose time is over.

@@ -380,10 +380,12 @@ async fn later_scans_are_registered_to_what_is_frozen() {
     let heads = heads(3);
     let members = service.upload_all(&heads).await;
     let first = service.jobs.submit(asked(members[..2].to_vec())).await.unwrap();
-    let early = service.jobs.add_scans(&first.id, members[2..].to_vec(), None).await;
+    let early = service.jobs.add_scans(&first.id, members[2..].to_vec(), None, None).await;
     assert!(matches!(early, Err(JobError::Conflict(_))), "{early:?}");
     let first = service.ended(&first).await;
-    let later = service.jobs.add_scans(&first.id, members[2..].to_vec(), None).await.unwrap();
+    let add = || service.jobs.add_scans(&first.id, members[2..].to_vec(), None, Some("key".into()));
+    let later = add().await.unwrap();
+    assert_eq!(add().await.unwrap().id, later.id, "asked for again with the same key it is the same");
     assert_eq!(later.template, TemplateChoice::Of(first.id.clone()));
     let later = service.ended(&later).await;
     assert_eq!((later.status, &later.settings), (Status::Succeeded, &first.settings));

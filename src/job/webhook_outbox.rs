@@ -9,6 +9,8 @@ use super::database::Database;
 use super::registration::RegistrationId;
 use super::store_error::StoreError;
 
+/// Milliseconds that a delivery is put off at most.
+pub const LONGEST_PAUSE: i64 = 12 * 60 * 60 * 1000;
 /// What secrets begin with.
 const PREFIX: &str = "whsec_";
 
@@ -55,9 +57,15 @@ impl WebhookOutbox {
     /// # Errors
     /// [`StoreError::Database`].
     pub async fn due(&self, limit: u32) -> Result<Vec<Delivery>, StoreError> {
-        let query =
-            "SELECT * FROM webhook_delivery WHERE ended_at IS NULL AND next_at <= ? ORDER BY next_at LIMIT ?";
-        let rows = sqlx::query(query).bind(now()).bind(limit).fetch_all(self.database.reader()).await?;
+        // What is further off than any pause was put off by a clock that has been set back since.
+        let query = "SELECT * FROM webhook_delivery WHERE ended_at IS NULL
+            AND (next_at <= ?1 OR next_at > ?1 + ?2) ORDER BY next_at LIMIT ?3";
+        let rows = sqlx::query(query)
+            .bind(now())
+            .bind(LONGEST_PAUSE)
+            .bind(limit)
+            .fetch_all(self.database.reader())
+            .await?;
         let delivery = |row: sqlx::sqlite::SqliteRow| {
             let broken = |problem: super::registration::BadRegistrationId| StoreError::Record {
                 what: "a delivery",
@@ -93,13 +101,13 @@ impl WebhookOutbox {
         Ok(())
     }
 
-    /// Notes that a delivery failed, and in how many milliseconds it is tried again.
+    /// Notes that a delivery failed, and in how many milliseconds it is tried again, at most [`LONGEST_PAUSE`].
     ///
     /// # Errors
     /// [`StoreError::Database`].
     pub async fn postpone(&self, delivery: &Delivery, milliseconds: i64) -> Result<(), StoreError> {
         let update = sqlx::query("UPDATE webhook_delivery SET failed = ?, next_at = ? WHERE message = ?");
-        let update = update.bind(delivery.failed + 1).bind(now().saturating_add(milliseconds));
+        let update = update.bind(delivery.failed + 1).bind(now() + milliseconds.min(LONGEST_PAUSE));
         update.bind(&delivery.message).execute(self.database.writer()).await?;
         Ok(())
     }

@@ -14,8 +14,8 @@ use crate::formats::Sha256;
 use crate::pipeline::{
     BadState, ComparisonRow, FailedScan, FrozenCollection, InputEntry, Inspected, LandmarkEntry,
     LandmarkWeights, MOST_ROWS, Manifest, Observer, OutputEntry, OutputFormat, Placed, Plan, PlanStage,
-    Precheck, Prepared, RegisterError, Report, ScanEntry, ScanResult, ScanState, Settings, SharedState,
-    Subject, Template, Verdict, comparison_row, comparison_sheet, decode, encode, leave_out,
+    Precheck, Prepared, RegisterError, Report, ScanEntry, ScanReport, ScanResult, ScanState, Settings,
+    SharedState, Subject, Template, Verdict, comparison_row, comparison_sheet, decode, encode, leave_out,
     precheck_inspected, record_bytes,
 };
 use crate::preflight::LandmarkAudit;
@@ -88,8 +88,16 @@ pub(super) enum Decided {
     Nothing,
     /// What is done from now on, and which scans are left out, by their places.
     Course(Vec<JobStage>, Vec<(i64, String)>),
-    /// Whether a scan's result can be used.
-    Verdict(Verdict),
+    /// How good a scan's result is.
+    Judgement(Judgement),
+}
+
+/// How good a scan's result is.
+pub(super) struct Judgement {
+    /// Whether it can be used.
+    pub verdict: Verdict,
+    /// Mean distance of the scan from it, in the scan's radius; none where they do not face each other.
+    pub residual: Option<f64>,
 }
 
 /// Why a step leaves nothing.
@@ -280,8 +288,16 @@ impl PackageWork {
         Ok(Produced {
             output: encode(&packaged),
             files: vec![(ResultFile::Mesh(scan), glb)],
-            decided: Decided::Verdict(result.report.verdict),
+            decided: Decided::Judgement(Judgement::of(&result.report, &subject)),
         })
+    }
+}
+
+impl Judgement {
+    fn of(report: &ScanReport, subject: &Subject) -> Self {
+        let radius = subject.mesh.radius_about(subject.mesh.centroid());
+        let distances = report.fidelity.scan_to_mesh.as_ref();
+        Self { verdict: report.verdict, residual: distances.map(|distances| distances.mean / radius) }
     }
 }
 

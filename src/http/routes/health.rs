@@ -81,6 +81,9 @@ async fn metrics(State(app): State<App>) -> Result<([(HeaderName, &'static str);
     for (stage, (steps, seconds)) in figures.stages {
         app.metrics.set_stage(stage, steps, seconds);
     }
+    for residual in app.jobs.take_residuals() {
+        app.metrics.residuals.observe(residual);
+    }
     app.metrics.free_bytes.set(app.folder.free_bytes()? as f64);
     Ok(([(CONTENT_TYPE, OPEN_METRICS)], app.metrics.text()))
 }

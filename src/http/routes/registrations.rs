@@ -1,5 +1,6 @@
 //! `/v1/registrations`
 
+use std::fmt::Display;
 use std::time::Duration;
 
 use axum::extract::State;
@@ -79,7 +80,7 @@ async fn create(
     if let Some(webhook) = &request.webhook {
         check_address(webhook, &app.config.webhooks)?;
     }
-    let dedupe_key = key_of(&headers)?.map(|key| format!("{}/{key}/{digest}", owner(&client)));
+    let dedupe_key = dedupe_key(&client, &headers, &digest)?;
     let new = request.into_new(client.key, dedupe_key)?;
     let registration = app.jobs.submit(new).await?;
     answer(&app, &headers, registration).await
@@ -169,15 +170,22 @@ async fn add_scans(
     Extension(client): Extension<Client>,
     Id(id): Id<RegistrationId>,
     headers: HeaderMap,
-    JsonBody { value: added, .. }: JsonBody<AddedScans>,
+    JsonBody { value: added, digest }: JsonBody<AddedScans>,
 ) -> Result<Response, Problem> {
     check_room(&app)?;
-    let registration = app.jobs.add_scans(&id, added.into_members()?, client.key).await?;
+    let dedupe_key = dedupe_key(&client, &headers, &format!("{id}/{digest}"))?;
+    let registration = app.jobs.add_scans(&id, added.into_members()?, client.key, dedupe_key).await?;
     answer(&app, &headers, registration).await
 }
 
-fn owner(client: &Client) -> &str {
-    client.key.as_deref().unwrap_or_default()
+/// What a registration is known by when it is asked for again, also where the server ended before it answered.
+fn dedupe_key(
+    client: &Client,
+    headers: &HeaderMap,
+    request: &dyn Display,
+) -> Result<Option<String>, Problem> {
+    let owner = client.key.as_deref().unwrap_or_default();
+    Ok(key_of(headers)?.map(|key| format!("{owner}/{key}/{request}")))
 }
 
 /// Tells of a new registration, after waiting for its end as long as the client likes.

@@ -11,16 +11,14 @@ use crate::http::wire::registration::RegistrationSummary;
 use crate::http::wire::rfc3339;
 use crate::job::JobError;
 use crate::job::StoreError;
-use crate::job::webhook_outbox::{Delivery, WebhookOutbox};
+use crate::job::webhook_outbox::{Delivery, LONGEST_PAUSE, WebhookOutbox};
 
 /// Deliveries that are tried at the same time.
 const AT_ONCE: usize = 8;
 /// Those that are taken up together.
 const BATCH: u32 = 64;
-/// Seconds before the second try; each pause after it is three times as long.
-const FIRST_PAUSE: i64 = 5;
-/// Seconds of the longest pause.
-const LONGEST_PAUSE: i64 = 12 * 60 * 60;
+/// Milliseconds before the second try; each pause after it is three times as long.
+const FIRST_PAUSE: i64 = 5000;
 /// How long to wait when nothing says that there is something to do.
 const IDLE: Duration = Duration::from_secs(60);
 
@@ -84,7 +82,7 @@ async fn attempt(
         Err(error) => {
             let pause = FIRST_PAUSE.saturating_mul(3_i64.saturating_pow(delivery.failed)).min(LONGEST_PAUSE);
             tracing::info!(%registration, error, pause, "webhook will be tried again");
-            outbox.postpone(&delivery, 1000 * pause).await
+            outbox.postpone(&delivery, pause).await
         }
     }
 }
