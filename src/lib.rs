@@ -8,8 +8,8 @@
 //! |---|---|---|
 //! | L0 | mesh | triangles, normals and edge lengths with their pull-backs, landmarks, template spheres |
 //! | L1 | numeric, camera | sparse Cholesky, rotations between point sets, the optimiser; `numeric/cholesky` alone names nalgebra_sparse; what cameras see |
-//! | L2 | spatial, reparam, energy, density, formats, picture, demo | nearest points, self-intersections; u and p; the terms that are minimised; target edge lengths; files; pictures; sculpted heads |
-//! | L3 | evaluate, preflight | figures of a result on its scan and across a collection; what is wrong with scans and landmarks |
+//! | L2 | spatial, reparam, energy, density, formats, picture, demo | nearest points, self-intersections; u and p; the terms that are minimised; target edge lengths; files; pictures; sculpted heads and figures |
+//! | L3 | evaluate, preflight, render | figures of a result on its scan and across a collection; what is wrong with scans and landmarks; pictures that are differentiated, by a rasterizer that alone names wgpu |
 //! | L4 | pipeline | the stages, their parameters, what they leave behind |
 //! | L5 | job | what is asked for, its state, its store, its worker: one data folder; knows no HTTP |
 //! | L6 | http | routes, wire types, problems, the OpenAPI document; alone names axum and utoipa |
@@ -57,5 +57,6 @@ pub mod numeric;
 pub mod picture;
 pub mod pipeline;
 pub mod preflight;
+pub mod render;
 pub mod reparam;
 pub mod spatial;

@@ -32,6 +32,13 @@ impl Intrinsics {
         DVec2::new((pixel.x - self.centre.x - self.skew * y) / self.focal.x, y)
     }
 
+    /// The same camera where each square of `factor` pixels a side has become one of `size`; what fills no square is cut
+    /// off at the right and below.
+    pub fn reduced(&self, factor: u32, size: [u32; 2]) -> Self {
+        let factor = f64::from(factor.max(1));
+        Self { size, focal: self.focal / factor, centre: self.centre / factor, skew: self.skew / factor }
+    }
+
     /// The same camera with a picture of another size, the lengths scaled along.
     pub fn resized(&self, size: [u32; 2]) -> Self {
         let scale = DVec2::new(

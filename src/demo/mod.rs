@@ -11,6 +11,7 @@ mod clay;
 mod ear;
 mod expression;
 mod eye;
+mod figure;
 mod head;
 mod identity;
 mod landmarks;
@@ -22,6 +23,7 @@ mod sculptor;
 mod skull;
 mod spacing;
 mod spline;
+mod surface_net;
 mod tessellation;
 mod truth;
 
@@ -30,6 +32,7 @@ mod tests;
 
 pub use anatomy::{Anatomy, Place};
 pub use expression::Expression;
+pub use figure::Figure;
 pub use head::Head;
 pub use identity::{Identity, PARAMETERS, Parameter};
 pub use pose::Pose;

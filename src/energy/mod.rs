@@ -9,6 +9,7 @@ mod foldover;
 mod landmark;
 mod normal;
 mod shape;
+mod smoothness;
 
 pub use adaptation::Adaptation;
 pub use chamfer::{Pull, SampleMatch, ScanToTemplate, TemplateToScan, VertexMatch};
@@ -16,3 +17,4 @@ pub use foldover::Foldover;
 pub use landmark::{LandmarkPull, Landmarks};
 pub use normal::{SampleNormals, VertexNormals};
 pub use shape::{Gradient, Shape};
+pub use smoothness::Smoothness;

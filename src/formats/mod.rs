@@ -20,6 +20,7 @@ mod mesh_source;
 mod numbering;
 mod obj;
 mod output;
+mod pixels;
 mod ply;
 mod polygons;
 mod scheme;
@@ -31,7 +32,7 @@ mod weld;
 
 use std::path::Path;
 
-pub use capture::{Capture, CaptureView};
+pub use capture::{Capture, CaptureView, Photograph, write_capture};
 pub use collection::{Collection, CollectionError, Member, Refused, Scan};
 pub use digest::Sha256;
 pub use error::{Fault, FormatError};
@@ -45,6 +46,7 @@ pub use mesh_format::MeshFormat;
 pub use mesh_source::MeshSource;
 pub use obj::{Obj, obj_bytes, write_obj};
 pub use output::write_whole;
+pub use pixels::{Encoding, Pixels};
 pub use ply::{Ply, ply_bytes, write_ply};
 pub use polygons::Polygons;
 pub use scheme::{Region, Scheme};

@@ -4,17 +4,17 @@ use std::sync::Arc;
 
 use glam::Vec3A;
 
+use super::density_term::DensityTerm;
 use super::matching::{SampleMatcher, Search, VertexMatcher};
 use super::observer::{Canceled, Watch};
 use super::scan_surface::ScanSurface;
-use super::settings::{Density, FitSettings, LevelSettings, Ramp};
+use super::settings::{FitSettings, LevelSettings, Ramp};
 use super::sphere::Sphere;
-use crate::density::{CurvatureDensity, uniform_lengths};
 use crate::energy::{
-    Adaptation, Foldover, Gradient, LandmarkPull, Landmarks, Pull, SampleNormals, ScanToTemplate, Shape,
-    TemplateToScan, VertexNormals,
+    Foldover, Gradient, LandmarkPull, Landmarks, Pull, SampleNormals, ScanToTemplate, Shape, TemplateToScan,
+    VertexNormals,
 };
-use crate::mesh::{Normals, SurfacePoint, mean_edge_lengths};
+use crate::mesh::{Normals, SurfacePoint};
 use crate::numeric::{AdamUniform, SolveBuffer};
 use crate::reparam::Reparameterization;
 
@@ -86,7 +86,7 @@ struct Deformation<'a> {
     settings: &'a LevelSettings,
     landmarks: Vec<LandmarkPull>,
     reparameterization: Arc<Reparameterization>,
-    curvature: Option<Arc<CurvatureDensity>>,
+    density: DensityTerm,
     adam: AdamUniform,
     u: Vec<Vec3A>,
     positions: Vec<Vec3A>,
@@ -111,7 +111,6 @@ impl<'a> Deformation<'a> {
     ) -> Self {
         let reparameterization = sphere.reparameterization(settings.lambda);
         let topology = &sphere.connectivity.topology;
-        let scheduled = matches!(settings.density, Density::Scheduled { .. });
         Self {
             scan,
             sphere,
@@ -119,7 +118,7 @@ impl<'a> Deformation<'a> {
             landmarks,
             u: reparameterization.parameters(topology, &positions),
             reparameterization,
-            curvature: scheduled.then(|| sphere.curvature_density()),
+            density: DensityTerm::new(settings.density, sphere),
             adam: AdamUniform::new(positions.len()),
             normals: Normals::new(topology, &positions),
             gradient: Gradient::zero(topology),
@@ -193,19 +192,7 @@ impl<'a> Deformation<'a> {
             energy +=
                 f64::from(normal) * SampleNormals { matches: samples, floor }.add(shape, normal, gradient);
         }
-        let (uniform, adaptive) = density_weights(settings.density, x);
-        if uniform > 0.0 || adaptive > 0.0 {
-            let lengths = mean_edge_lengths(topology, shape.positions);
-            let desired = match &self.curvature {
-                Some(curvature) if adaptive > 0.0 => {
-                    curvature.lengths(topology, shape.positions, &lengths, &mut self.buffer)
-                }
-                _ => uniform_lengths(&lengths),
-            };
-            let weight = uniform.max(adaptive);
-            let adaptation = Adaptation { lengths: &lengths, desired: &desired };
-            energy += f64::from(weight) * adaptation.add(shape, weight, gradient);
-        }
+        energy += self.density.add(shape, x, gradient, &mut self.buffer);
         let foldover = at(settings.foldover, x);
         if foldover > 0.0 {
             energy += f64::from(foldover) * Foldover { cosine: 0.0, floor }.add(shape, foldover, gradient);
@@ -215,16 +202,5 @@ impl<'a> Deformation<'a> {
             energy += f64::from(weight) * Landmarks { pulls: &self.landmarks }.add(shape, weight, gradient);
         }
         energy
-    }
-}
-
-/// w_u and w_k at a share x of the iterations; never both.
-fn density_weights(density: Density, x: f32) -> (f32, f32) {
-    match density {
-        Density::Off => (0.0, 0.0),
-        Density::Scheduled { strength } if x < 0.25 => (strength, 0.0),
-        Density::Scheduled { strength } if x < 0.5 => (0.0, 2.0 * strength),
-        Density::Scheduled { .. } => (0.0, 0.0),
-        Density::Fading { uniform } => (uniform * (1.0 - x), 0.0),
     }
 }

@@ -1,13 +1,16 @@
 //! The paper's stages over a collection: fit, resample, register, and what we add to them. Layer 4.
 
+mod capture;
 mod carried;
 mod comparison;
 mod confidence;
 mod connectivity;
+mod density_term;
 mod fit;
 mod frozen;
 mod groupwise;
 mod head;
+mod invert;
 mod known;
 mod landmark_weights;
 mod laying;
@@ -36,12 +39,17 @@ mod template;
 mod transfer;
 mod verdict;
 
+pub use capture::{CaptureSettings, capture};
 pub use comparison::{ComparisonRow, MOST_ROWS, comparison_row, comparison_sheet};
 pub use confidence::confidence;
 pub use connectivity::Connectivity;
 pub use fit::{SphereLandmark, fit};
 pub use frozen::{FrozenCollection, FrozenError};
 pub use head::head;
+pub use invert::{
+    AdapterEntry, Albedo, HullReport, Inversion, InversionReport, InvertError, InvertLevel, InvertPreset,
+    InvertSettings, Shown, Smooth, UnitSpace, ViewPictures, ViewReport, Views, What, contact_sheet, invert,
+};
 pub use landmark_weights::LandmarkWeights;
 pub use manifest::{InputEntry, LandmarkEntry, Manifest, OutputEntry, ScanEntry, TemplateEntry};
 pub use mask::MaskError;

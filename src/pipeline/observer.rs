@@ -12,6 +12,10 @@ pub enum Stage {
     Register,
     /// Every scan again from the collection's mean.
     Groupwise,
+    /// The sphere to pictures.
+    Invert,
+    /// Pictures of a mesh.
+    Capture,
 }
 
 impl std::fmt::Display for Stage {
@@ -23,6 +27,8 @@ impl std::fmt::Display for Stage {
             Self::Resample => "resample",
             Self::Register => "register",
             Self::Groupwise => "groupwise",
+            Self::Invert => "invert",
+            Self::Capture => "capture",
         })
     }
 }

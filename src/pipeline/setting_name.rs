@@ -1,5 +1,7 @@
 //! Parameters by name, as people write them: `groupwise.rounds=3`, `fit.levels.0.lambda=6`.
 
+use serde::Serialize;
+use serde::de::DeserializeOwned;
 use serde_json::Value;
 
 use super::settings::{FitSettings, SettingError, Settings};
@@ -8,7 +10,7 @@ use crate::mesh::Icosphere;
 /// No parameter is larger: counts beyond it would take all memory, and lengths and weights mean nothing there.
 const LARGEST: f64 = 1e7;
 /// The finest sphere: 40962 vertices.
-const FINEST: u32 = 6;
+pub(super) const FINEST: u32 = 6;
 
 impl Settings {
     /// Sets the parameter of a dotted name: fields by their names, levels by their place counted from 0.
@@ -19,24 +21,7 @@ impl Settings {
     /// # Errors
     /// [`SettingError`] names what there is beside a name that does not exist, or says why a value cannot be.
     pub fn set(&mut self, name: &str, value: &str) -> Result<(), SettingError> {
-        let refused =
-            |reason: String| SettingError::Value { name: name.to_owned(), value: value.to_owned(), reason };
-        if name == "preset" || name == "vertices" {
-            return Err(refused(
-                "all others follow from it; begin with the preset of that kind and size".into(),
-            ));
-        }
-        let mut document = document(self);
-        let (place, is_new) = place(&mut document, name)?;
-        let beside = known(place.parent);
-        let parsed = serde_json::from_str(value).unwrap_or_else(|_| Value::from(value));
-        place.put(parsed);
-        let changed: Self = serde_json::from_value(document).map_err(|error| {
-            // A name beside those of a map, such as a landmark's, may be new; beside fields it may not.
-            if is_new { unknown(name, beside) } else { refused(error.to_string()) }
-        })?;
-        changed.check().map_err(|problem| refused(problem.to_string()))?;
-        *self = changed;
+        *self = with_parameter(self, name, value, Self::check)?;
         Ok(())
     }
 
@@ -74,7 +59,35 @@ impl Settings {
     }
 }
 
-fn document(settings: &Settings) -> Value {
+/// Parameters of any kind with the one of a dotted name set, if they then pass `check`.
+///
+/// # Errors
+/// As [`Settings::set`].
+pub(super) fn with_parameter<S: Serialize + DeserializeOwned>(
+    settings: &S,
+    name: &str,
+    value: &str,
+    check: impl Fn(&S) -> Result<(), SettingError>,
+) -> Result<S, SettingError> {
+    let refused =
+        |reason: String| SettingError::Value { name: name.to_owned(), value: value.to_owned(), reason };
+    if name == "preset" || name == "vertices" {
+        return Err(refused("all others follow from it; begin with the preset of that kind and size".into()));
+    }
+    let mut document = document(settings);
+    let (place, is_new) = place(&mut document, name)?;
+    let beside = known(place.parent);
+    let parsed = serde_json::from_str(value).unwrap_or_else(|_| Value::from(value));
+    place.put(parsed);
+    let changed: S = serde_json::from_value(document).map_err(|error| {
+        // A name beside those of a map, such as a landmark's, may be new; beside fields it may not.
+        if is_new { unknown(name, beside) } else { refused(error.to_string()) }
+    })?;
+    check(&changed).map_err(|problem| refused(problem.to_string()))?;
+    Ok(changed)
+}
+
+pub(super) fn document<S: Serialize>(settings: &S) -> Value {
     serde_json::to_value(settings).expect("settings are plain numbers and names")
 }
 
@@ -143,7 +156,7 @@ fn unknown_in(name: &str, parent: &str, known: String) -> SettingError {
 }
 
 /// Cosines lie in [-1, 1]; everything else is a length, a weight or a count.
-fn check_numbers(value: &Value, name: &str) -> Result<(), SettingError> {
+pub(super) fn check_numbers(value: &Value, name: &str) -> Result<(), SettingError> {
     let inner = |key: &str| if name.is_empty() { key.to_owned() } else { format!("{name}.{key}") };
     match value {
         Value::Object(fields) => fields.iter().try_for_each(|(key, value)| check_numbers(value, &inner(key))),

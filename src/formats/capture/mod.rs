@@ -4,17 +4,21 @@
 mod colmap;
 mod lens;
 mod metashape;
+mod photograph;
 mod pictures;
 #[cfg(test)]
 mod tests;
 mod transforms;
+mod writer;
 
 use std::path::{Path, PathBuf};
 
 use super::error::{Fault, FormatError};
 use super::input::read_file;
 use crate::camera::Camera;
+pub use photograph::Photograph;
 use pictures::Pictures;
+pub use writer::write_capture;
 
 /// A picture and the camera that took it.
 #[derive(Debug, Clone, PartialEq)]
