@@ -7,7 +7,9 @@ use std::time::Duration;
 use serde::{Deserialize, Serialize};
 
 use crate::job::JobSettings;
+use crate::job::capture::CaptureLimits;
 use crate::job::scan::ScanLimits;
+use crate::render::AdapterChoice;
 
 /// Everything that can be set about the service, with its defaults: a TOML file has the same names.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -73,6 +75,8 @@ pub struct DataConfig {
 pub struct Limits {
     /// How large a scan may be.
     pub scan: ScanLimits,
+    /// How large pictures with cameras may be.
+    pub capture: CaptureLimits,
     /// How many registrations there may be.
     pub registration: RegistrationLimits,
     /// How often may be asked.
@@ -101,6 +105,8 @@ pub struct WorkConfig {
     pub threads: usize,
     /// Bytes of scans that are kept ready between steps.
     pub cache_bytes: usize,
+    /// What draws inverse renderings: `best`, `reference` for the program's own rasterizer, or a part of an adapter's name.
+    pub adapter: String,
 }
 
 /// How often may be asked.
@@ -184,7 +190,7 @@ impl Default for RegistrationLimits {
 
 impl Default for WorkConfig {
     fn default() -> Self {
-        Self { threads: 0, cache_bytes: 1 << 30 }
+        Self { threads: 0, cache_bytes: 1 << 30, adapter: AdapterChoice::Best.to_string() }
     }
 }
 
@@ -254,6 +260,9 @@ impl From<&Config> for JobSettings {
             keep_free: config.data.keep_free_bytes,
             keep: config.retention.registrations(),
             scan_limits: config.limits.scan,
+            capture_limits: config.limits.capture,
+            // Every text is a choice.
+            adapter: config.work.adapter.parse().unwrap_or_default(),
             ..usual
         }
     }

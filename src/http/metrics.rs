@@ -20,8 +20,8 @@ pub struct Metrics {
     registry: Registry,
     requests: Family<RequestLabels, Counter>,
     seconds: Family<RouteLabels, Histogram, fn() -> Histogram>,
-    /// Registrations by status.
-    pub registrations: Family<StatusLabels, Gauge>,
+    /// Jobs by kind and status.
+    pub jobs: Family<JobLabels, Gauge>,
     /// Steps that could run or run.
     pub steps: Family<StatusLabels, Gauge>,
     stage_steps: Family<StageLabels, Counter>,
@@ -50,6 +50,15 @@ struct StageLabels {
     stage: &'static str,
 }
 
+/// A kind of job and a status.
+#[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
+pub struct JobLabels {
+    /// The kind's name.
+    pub kind: &'static str,
+    /// The status' name.
+    pub status: &'static str,
+}
+
 /// A status.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
 pub struct StatusLabels {
@@ -66,8 +75,8 @@ impl Metrics {
         let seconds = Family::<_, _, fn() -> _>::new_with_constructor(|| Histogram::new(REQUEST_SECONDS));
         let help = "Time to an answer's head";
         registry.register_with_unit("http_request_duration", help, Unit::Seconds, seconds.clone());
-        let registrations = Family::default();
-        registry.register("registrations", "Registrations by status", registrations.clone());
+        let jobs = Family::default();
+        registry.register("jobs", "Jobs by kind and status", jobs.clone());
         let steps = Family::default();
         registry.register("steps", "Steps of work that wait for a thread or run", steps.clone());
         let stage_steps = Family::default();
@@ -81,17 +90,7 @@ impl Metrics {
         let free_bytes = Gauge::default();
         let help = "Free on the data folder's disk";
         registry.register_with_unit("data_folder_free", help, Unit::Bytes, free_bytes.clone());
-        Self {
-            registry,
-            requests,
-            seconds,
-            registrations,
-            steps,
-            stage_steps,
-            stage_seconds,
-            residuals,
-            free_bytes,
-        }
+        Self { registry, requests, seconds, jobs, steps, stage_steps, stage_seconds, residuals, free_bytes }
     }
 
     /// Counts a request: by its route, not its path, so that there are few series.

@@ -51,17 +51,36 @@ pub async fn receive(app: &App, request: Request, parts: &[Part]) -> Result<NewS
 /// # Errors
 /// A [`Problem`]; nothing is kept then.
 pub async fn receive_body(app: &App, body: Body) -> Result<Kept, Problem> {
-    check_room(app)?;
-    store(app, "body", pieces(app, body)).await
+    receive_file(app, body, app.config.limits.scan.upload_bytes).await
 }
 
-/// Stores a file that comes as a field or as the body.
-async fn store<E: Display>(
+/// Stores a body that is one file of at most `limit` bytes.
+///
+/// # Errors
+/// A [`Problem`]; nothing is kept then.
+pub async fn receive_file(app: &App, body: Body, limit: u64) -> Result<Kept, Problem> {
+    check_room(app)?;
+    store(app, "body", pieces(app, body), limit).await
+}
+
+/// A form's request, whose pieces have to come in time.
+pub fn form_body(app: &App, request: Request) -> Request {
+    let (head, body) = request.into_parts();
+    let body = Body::from_stream(pieces(app, body).map_err(std::io::Error::other));
+    Request::from_parts(head, body)
+}
+
+/// Stores a file of at most `limit` bytes that comes as a field or as the body.
+///
+/// # Errors
+/// A [`Problem`]; nothing is kept then.
+pub async fn store<E: Display>(
     app: &App,
     field: &str,
     pieces: impl Stream<Item = Result<Bytes, E>>,
+    limit: u64,
 ) -> Result<Kept, Problem> {
-    let kept = app.blobs.put(pieces, app.config.limits.scan.upload_bytes).await?;
+    let kept = app.blobs.put(pieces, limit).await?;
     if kept.info.size == 0 {
         return Err(Problem::of_field(Kind::UnreadableFile, field, "is empty", "send the file's bytes"));
     }
@@ -69,9 +88,7 @@ async fn store<E: Display>(
 }
 
 async fn receive_form(app: &App, request: Request, parts: &[Part]) -> Result<NewScan, Problem> {
-    let (head, body) = request.into_parts();
-    let body = Body::from_stream(pieces(app, body).map_err(std::io::Error::other));
-    let form = Multipart::from_request(Request::from_parts(head, body), app).await;
+    let form = Multipart::from_request(form_body(app, request), app).await;
     let mut form = form.map_err(|error| malformed(error.body_text()))?;
     let (mut name, mut kind, mut files) = (None, None, BTreeMap::new());
     while let Some(field) = form.next_field().await.map_err(|error| malformed(error.body_text()))? {
@@ -86,7 +103,7 @@ async fn receive_form(app: &App, request: Request, parts: &[Part]) -> Result<New
             return Err(Problem::of_field(Kind::InvalidField, called, "is no field of this form", &remedy));
         };
         let said = (field.content_type().map(str::to_ascii_lowercase), field.file_name().map(str::to_owned));
-        let kept = store(app, part.name(), field).await?;
+        let kept = store(app, part.name(), field, app.config.limits.scan.upload_bytes).await?;
         if *part == Part::Mesh {
             kind = said.0.as_deref().and_then(kind_of);
             if kind.is_none() {

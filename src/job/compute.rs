@@ -65,7 +65,7 @@ fn message(panic: &(dyn std::any::Any + Send)) -> String {
 /// Why a step is to stop.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Stop {
-    /// Its registration was canceled or deleted.
+    /// Its job was canceled or deleted.
     Canceled = 1,
     /// It has taken too long.
     TooSlow = 2,
@@ -76,8 +76,8 @@ pub(super) enum Stop {
 /// A step that runs, as both sides see it.
 #[derive(Debug, Default)]
 pub(super) struct Control {
-    /// Its registration.
-    pub registration: i64,
+    /// Its job.
+    pub job: i64,
     /// No other runs beside it.
     pub alone: bool,
     stop: AtomicU8,
@@ -85,8 +85,8 @@ pub(super) struct Control {
 }
 
 impl Control {
-    pub fn new(registration: i64, alone: bool) -> Self {
-        Self { registration, alone, ..Self::default() }
+    pub fn new(job: i64, alone: bool) -> Self {
+        Self { job, alone, ..Self::default() }
     }
 
     /// Asks it to stop; the first reason counts.

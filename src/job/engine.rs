@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use sqlx::{Row, Sqlite, Transaction};
+use sqlx::{Sqlite, Transaction};
 use tokio::sync::{Notify, broadcast, watch};
 use tracing::{Instrument, info_span};
 
@@ -18,11 +18,12 @@ use super::event::{Event, EventKind};
 use super::graph::{self, Changed, Claim, Done};
 use super::inputs::Inputs;
 use super::record::{Fractions, add_event};
-use super::registration::Problem;
 use super::settings::JobSettings;
+use super::state::Problem;
 use super::store_error::StoreError;
 use super::work::{Decided, Fault, Produced};
 use super::{queue, sweep};
+use crate::render::Adapter;
 
 /// How often a running step is looked after: whether it is to stop, how far it is.
 const LOOK: Duration = Duration::from_millis(200);
@@ -46,9 +47,13 @@ pub(super) struct Engine {
     feeds: Mutex<HashMap<i64, broadcast::Sender<Event>>>,
     /// Told when steps become ready.
     pub wake: Notify,
+    /// What draws, once it was opened.
+    pub renderer: tokio::sync::Mutex<Option<Adapter>>,
+    /// Held by whoever unpacks a capture to look at it.
+    pub unpacking: tokio::sync::Mutex<()>,
     /// Why no work begins, if none does.
     pub paused: watch::Sender<Option<String>>,
-    /// Counts the registrations that ended.
+    /// Counts the jobs that ended.
     pub finished: watch::Sender<u64>,
     /// Whether the program ends.
     pub closing: watch::Sender<bool>,
@@ -102,6 +107,8 @@ impl Engine {
             running: Mutex::default(),
             feeds: Mutex::default(),
             wake: Notify::new(),
+            renderer: tokio::sync::Mutex::default(),
+            unpacking: tokio::sync::Mutex::default(),
             paused: watch::Sender::new(None),
             finished: watch::Sender::new(0),
             closing: watch::Sender::new(false),
@@ -130,13 +137,13 @@ impl Engine {
             return Ok(false);
         }
         let Some(claim) = graph::claim(&mut tx, &mut changed, others_run).await? else { return Ok(false) };
-        let control = Arc::new(Control::new(claim.registration, claim.alone));
+        let control = Arc::new(Control::new(claim.job, claim.alone));
         lock(&self.running).insert(claim.step, control.clone());
         let guard = Running { engine: self, step: claim.step };
         tx.commit().await?;
         self.publish(changed);
         let stage = claim.stage().name();
-        let span = info_span!("step", registration = claim.id, stage, place = claim.place, run = claim.run);
+        let span = info_span!("step", job = claim.id, stage, place = claim.place, run = claim.run);
         let work = async {
             let start = Instant::now();
             let outcome = self.run(&claim, control).await;
@@ -170,7 +177,7 @@ impl Engine {
             if start.elapsed() > self.settings.step_time {
                 control.stop(Stop::TooSlow);
             }
-            if self.is_over(claim.registration).await {
+            if self.is_over(claim.job).await {
                 control.stop(Stop::Canceled);
             }
             if start.elapsed() > self.settings.step_time + GRACE {
@@ -196,12 +203,11 @@ impl Engine {
         })
     }
 
-    /// Whether a registration has ended, by somebody else's hand.
-    async fn is_over(&self, registration: i64) -> bool {
-        let query = sqlx::query_scalar::<_, i64>(
-            "SELECT 1 FROM registration WHERE sequence = ? AND status = 'running'",
-        );
-        let found = query.bind(registration).fetch_optional(self.database.reader()).await;
+    /// Whether a job has ended, by somebody else's hand.
+    async fn is_over(&self, job: i64) -> bool {
+        let query =
+            sqlx::query_scalar::<_, i64>("SELECT 1 FROM job WHERE sequence = ? AND status = 'running'");
+        let found = query.bind(job).fetch_optional(self.database.reader()).await;
         matches!(found, Ok(None))
     }
 
@@ -209,20 +215,16 @@ impl Engine {
     async fn tell(&self, claim: &Claim, stage_progress: f64) {
         let told = async {
             let mut connection = self.database.reader().acquire().await?;
-            let query = "SELECT c.scan, r.id FROM child c JOIN registration r ON r.sequence = c.registration
-                WHERE c.registration = ? AND c.place = ?";
-            let row = sqlx::query(query).bind(claim.registration).bind(claim.place);
-            let Some(row) = row.fetch_optional(&mut *connection).await? else { return Ok(()) };
-            let parse = |column| row.try_get::<String, _>(column);
-            let scan = parse("scan")?.parse().map_err(super::record::broken)?;
-            let id = parse("id")?.parse().map_err(super::record::broken)?;
-            let whole = super::record::whole(&mut connection, &id, &self.fractions()).await?;
+            let scan = sqlx::query_scalar::<_, String>("SELECT scan FROM child WHERE job = ? AND place = ?");
+            let scan = scan.bind(claim.job).bind(claim.place).fetch_optional(&mut *connection).await?;
+            let scan = scan.map(|scan| scan.parse()).transpose().map_err(super::record::broken)?;
+            let fractions = self.fractions();
+            let progress = super::record::progress_of(&mut connection, claim.job, &fractions).await?;
             drop(connection);
-            let progress = whole.map_or(0.0, |whole| whole.progress);
             let stage = claim.stage().name().to_owned();
             let mut tx = self.database.begin_write().await?;
             let event = EventKind::Progress { progress, scan, stage, stage_progress };
-            let event = add_event(&mut tx, claim.registration, event).await?;
+            let event = add_event(&mut tx, claim.job, event).await?;
             tx.commit().await?;
             self.publish(Changed { events: vec![event], ..Changed::default() });
             Ok::<(), StoreError>(())
@@ -285,12 +287,12 @@ impl Engine {
             let room = residuals.len() < RESIDUALS;
             residuals.extend(residual.filter(|_| room));
         }
-        graph::end_if_too_long(&mut tx, claim.registration, self.settings.job_time, &mut changed).await?;
+        graph::end_if_too_long(&mut tx, claim.job, self.settings.job_time, &mut changed).await?;
         self.commit(tx, changed).await?;
         let digests = held.iter().map(|kept| kept.info.digest).collect();
         drop(held);
         if !own {
-            // The registration ended meanwhile: nobody will name these.
+            // The job ended meanwhile: nobody will name these.
             sweep::collect(&self.database, &self.blobs, digests).await?;
         }
         Ok(())
@@ -336,20 +338,20 @@ impl Engine {
     /// Tells of a change that is committed.
     fn publish(&self, changed: Changed) {
         let mut feeds = lock(&self.feeds);
-        for (registration, event) in changed.events {
+        for (job, event) in changed.events {
             let last = event.kind.is_last();
-            if let Some(feed) = feeds.get(&registration) {
+            if let Some(feed) = feeds.get(&job) {
                 // Nobody may listen any more.
                 let _ = feed.send(event);
             }
             if last {
-                feeds.remove(&registration);
+                feeds.remove(&job);
             }
         }
         feeds.retain(|_, feed| feed.receiver_count() > 0);
         drop(feeds);
-        for registration in &changed.ended {
-            self.stop(*registration);
+        for job in &changed.ended {
+            self.stop(*job);
         }
         if !changed.ended.is_empty() {
             self.finished.send_modify(|count| *count += changed.ended.len() as u64);
@@ -366,20 +368,17 @@ impl Engine {
         self.paused.send_replace(Some(reason));
     }
 
-    /// The events of a registration from now on.
-    pub fn subscribe(&self, registration: i64) -> broadcast::Receiver<Event> {
+    /// The events of a job from now on.
+    pub fn subscribe(&self, job: i64) -> broadcast::Receiver<Event> {
         const BUFFERED: usize = 64;
         let mut feeds = lock(&self.feeds);
-        feeds.entry(registration).or_insert_with(|| broadcast::channel(BUFFERED).0).subscribe()
+        feeds.entry(job).or_insert_with(|| broadcast::channel(BUFFERED).0).subscribe()
     }
 
-    /// Asks the steps of a registration to stop.
-    fn stop(&self, registration: i64) {
+    /// Asks the steps of a job to stop.
+    fn stop(&self, job: i64) {
         let running = lock(&self.running);
-        running
-            .values()
-            .filter(|own| own.registration == registration)
-            .for_each(|own| own.stop(Stop::Canceled));
+        running.values().filter(|own| own.job == job).for_each(|own| own.stop(Stop::Canceled));
     }
 
     /// Asks all steps to stop, because the program ends.

@@ -7,9 +7,11 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 use serde_json::value::RawValue;
 
-use super::registration::{Problem, ResultFile};
+use super::invert_work::InvertWork;
+use super::result_file::ResultFile;
 use super::scan::ScanId;
 use super::stage::JobStage;
+use super::state::Problem;
 use crate::formats::Sha256;
 use crate::pipeline::{
     BadState, ComparisonRow, FailedScan, FrozenCollection, InputEntry, Inspected, LandmarkEntry,
@@ -41,6 +43,8 @@ pub(super) enum Work {
     Package(PackageWork),
     /// [`JobStage::Set`].
     Set(SetWork),
+    /// [`JobStage::Invert`].
+    Invert(InvertWork),
 }
 
 /// The scans as they were inspected, by their places.
@@ -81,7 +85,7 @@ pub(super) struct Produced {
     pub decided: Decided,
 }
 
-/// What a step decides for the registration.
+/// What a step decides for its job.
 #[derive(Default)]
 pub(super) enum Decided {
     #[default]
@@ -204,6 +208,7 @@ impl Work {
             }
             Self::Package(work) => work.run(),
             Self::Set(work) => work.run(),
+            Self::Invert(work) => work.run(observer),
         }
     }
 }

@@ -147,7 +147,7 @@ fn check_store(folder: &Path, kills: usize) {
         let interrupted: i64 = steps.iter().map(|(_, crashes, _)| crashes).sum();
         let threads = std::thread::available_parallelism().unwrap().get();
         assert!(interrupted as usize <= kills * threads, "{interrupted}");
-        let named = "SELECT digest FROM uploaded_blob UNION SELECT digest FROM registered_blob";
+        let named = "SELECT digest FROM uploaded_blob UNION SELECT digest FROM job_blob";
         let named: Vec<String> = sqlx::query_scalar(named).fetch_all(database.reader()).await.unwrap();
         assert_eq!(files(&folder.join("blobs")), named.into_iter().collect());
         assert_eq!(files(&folder.join("uploads")), BTreeSet::new());

@@ -6,6 +6,7 @@
 mod cameras;
 mod descent;
 mod error;
+mod files;
 mod hull;
 mod light;
 mod pictures;
