@@ -1,14 +1,14 @@
 # Works from a fresh checkout on Debian: what is missing is installed first, as root or by sudo.
 
-.PHONY: demo test durability contract bench service-cost service-load licences openapi templates pictures rust validator schemathesis
+.PHONY: demo test durability contract bench service-cost service-load licences openapi templates pictures rust validator schemathesis vulkan
 
 # The demo collection, registered by a server of its own: meshes, report and picture.
-demo: rust
+demo: rust vulkan
 	cargo build --release --locked
 	scripts/demo $${CARGO_TARGET_DIR:-target}/release/onemesh demo
 
 # Every test there is.
-test: rust validator schemathesis
+test: rust validator schemathesis vulkan
 	cargo test --workspace --locked
 
 # The server killed twenty times in the middle of twelve scans; minutes.
@@ -16,7 +16,7 @@ durability: rust
 	cargo test --release --locked --test durability -- --ignored
 
 # How long each stage and kernel takes.
-bench: rust
+bench: rust vulkan
 	cargo run --release --locked -- bench
 
 # Twelve scans over HTTP against the command line's own registration of them; minutes.
@@ -75,6 +75,11 @@ validator:
 tests/gltf_validator/node_modules: tests/gltf_validator/package-lock.json
 	npm ci --no-audit --no-fund --prefix $(@D)
 	@touch $@
+
+# A Vulkan driver, in software where there is no other; without one the tests that draw with it say that they are skipped.
+vulkan:
+	@ls /usr/share/vulkan/icd.d/*.json /etc/vulkan/icd.d/*.json 2>/dev/null | grep -q . || \
+		[ "$$(uname)" != Linux ] || $(call apt,mesa-vulkan-drivers) || true
 
 # The same of schemathesis, where python cannot be had.
 schemathesis:

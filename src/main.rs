@@ -21,6 +21,8 @@ enum Command {
     Register(cli::Register),
     Submit(cli::Submit),
     Fit(cli::Fit),
+    Invert(cli::Invert),
+    Capture(cli::Capture),
     Evaluate(cli::Evaluate),
     Inspect(cli::Inspect),
     Audit(cli::Audit),
@@ -30,6 +32,7 @@ enum Command {
     Key(cli::Key),
     Openapi(cli::Openapi),
     Health(cli::Health),
+    Doctor(cli::Doctor),
 }
 
 fn main() -> ExitCode {
@@ -38,6 +41,8 @@ fn main() -> ExitCode {
         Command::Register(command) => command.run(),
         Command::Submit(command) => command.run(),
         Command::Fit(command) => command.run(),
+        Command::Invert(command) => command.run(),
+        Command::Capture(command) => command.run(),
         Command::Evaluate(command) => command.run(),
         Command::Inspect(command) => command.run(),
         Command::Audit(command) => command.run(),
@@ -47,5 +52,6 @@ fn main() -> ExitCode {
         Command::Key(command) => command.run(),
         Command::Openapi(command) => command.run(),
         Command::Health(command) => command.run(),
+        Command::Doctor(command) => command.run(),
     }))
 }

@@ -42,6 +42,18 @@ fn glb_json(path: &Path) -> Value {
 }
 
 #[test]
+fn the_doctor_says_what_draws() {
+    for adapter in ["reference", "fastest"] {
+        let said = succeeded(&onemesh(["doctor", "--adapter", adapter]));
+        assert!(said.contains("processors: ") && said.ends_with("it draws as it should\n"), "{said}");
+    }
+    let output = onemesh(["doctor", "--adapter", "no such card"]);
+    assert!(String::from_utf8_lossy(&output.stdout).contains("graphics adapters:"));
+    let said = complaint(&output);
+    assert!(said.contains("no such card") || said.contains("mesa-vulkan-drivers"), "{said}");
+}
+
+#[test]
 fn a_collection_is_registered() {
     let folder = tempfile::tempdir().unwrap();
     let (scans, out) = (folder.path().join("scans"), folder.path().join("out"));

@@ -2,15 +2,18 @@
 
 mod audit;
 mod bench;
+mod capture;
 mod client;
 mod demo;
 mod difference;
+mod doctor;
 mod evaluate;
 mod findings;
 mod fit;
 mod formats;
 mod health;
 mod inspect;
+mod invert;
 mod key;
 mod logging;
 mod openapi;
@@ -30,11 +33,14 @@ use std::process::ExitCode;
 
 pub use audit::Audit;
 pub use bench::Bench;
+pub use capture::Capture;
 pub use demo::Demo;
+pub use doctor::Doctor;
 pub use evaluate::Evaluate;
 pub use fit::Fit;
 pub use health::Health;
 pub use inspect::Inspect;
+pub use invert::Invert;
 pub use key::Key;
 pub use openapi::Openapi;
 pub use register::Register;

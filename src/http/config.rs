@@ -105,7 +105,8 @@ pub struct WorkConfig {
     pub threads: usize,
     /// Bytes of scans that are kept ready between steps.
     pub cache_bytes: usize,
-    /// What draws inverse renderings: `best`, `reference` for the program's own rasterizer, or a part of an adapter's name.
+    /// What draws inverse renderings: `best`, `fastest`, `reference` for the program's own rasterizer, or a
+    /// part of an adapter's name.
     pub adapter: String,
 }
 

@@ -4,7 +4,7 @@ use super::capture::{CaptureFault, CaptureFiles, CaptureLimits};
 use super::result_file::ResultFile;
 use super::work::{Fault, Produced};
 use crate::formats::Capture;
-use crate::pipeline::{Inversion, InvertError, InvertSettings, Observer, Views, invert, record_bytes};
+use crate::pipeline::{Inversion, InvertError, InvertSettings, Observer, OutputFormat, Views, invert};
 use crate::render::{self, AdapterChoice, RenderError};
 
 /// Devices that are tried before one that is lost is the job's end.
@@ -31,9 +31,9 @@ impl InvertWork {
         })?;
         let unfit = |error: &dyn std::fmt::Display| Fault::problem("engine", error);
         let files = vec![
-            (ResultFile::Object, inversion.glb_bytes().map_err(|error| unfit(&error))?),
+            (ResultFile::Object, inversion.bytes("mesh", OutputFormat::Glb).map_err(|error| unfit(&error))?),
             (ResultFile::Sheet, inversion.sheet().png_bytes().map_err(|error| unfit(&error))?),
-            (ResultFile::Report, record_bytes(&inversion.report)),
+            (ResultFile::Report, inversion.report_json().into_bytes()),
         ];
         Ok(Produced { files, ..Produced::default() })
     }

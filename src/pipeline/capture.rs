@@ -39,6 +39,11 @@ const STUDIO: Light = Light([
     [0.03, 0.02, 0.02],
 ]);
 
+/// The light that shaded pictures are taken in.
+pub fn studio_light() -> Light {
+    STUDIO
+}
+
 /// Takes pictures of a mesh, in light intensities.
 ///
 /// # Errors

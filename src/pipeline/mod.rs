@@ -39,7 +39,7 @@ mod template;
 mod transfer;
 mod verdict;
 
-pub use capture::{CaptureSettings, capture};
+pub use capture::{CaptureSettings, capture, studio_light};
 pub use comparison::{ComparisonRow, MOST_ROWS, comparison_row, comparison_sheet};
 pub use confidence::confidence;
 pub use connectivity::Connectivity;
@@ -48,7 +48,7 @@ pub use frozen::{FrozenCollection, FrozenError};
 pub use head::head;
 pub use invert::{
     AdapterEntry, Albedo, HullReport, Inversion, InversionReport, InvertError, InvertLevel, InvertPreset,
-    InvertSettings, Shown, Smooth, UnitSpace, ViewPictures, ViewReport, Views, What, contact_sheet, invert,
+    InvertSettings, Shown, Smooth, UnitSpace, ViewPictures, ViewReport, Views, What, invert,
 };
 pub use landmark_weights::LandmarkWeights;
 pub use manifest::{InputEntry, LandmarkEntry, Manifest, OutputEntry, ScanEntry, TemplateEntry};

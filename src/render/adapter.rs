@@ -56,6 +56,8 @@ pub enum AdapterChoice {
     /// The first of discrete, integrated, virtual and software ones.
     #[default]
     Best,
+    /// The first that is not in software, or else [`Self::Reference`], which is faster than drivers in software.
+    Fastest,
     /// The first whose name or driver has these letters, in either case.
     Named(String),
     /// This program's own rasterizer on the processor.
@@ -65,10 +67,11 @@ pub enum AdapterChoice {
 impl FromStr for AdapterChoice {
     type Err = Infallible;
 
-    /// `best`, `reference`, or part of a name.
+    /// `best`, `fastest`, `reference`, or part of a name.
     fn from_str(text: &str) -> Result<Self, Infallible> {
         Ok(match text.trim() {
             "" | "best" => Self::Best,
+            "fastest" => Self::Fastest,
             "reference" => Self::Reference,
             name => Self::Named(name.into()),
         })
@@ -79,8 +82,22 @@ impl fmt::Display for AdapterChoice {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::Best => "best",
+            Self::Fastest => "fastest",
             Self::Named(name) => name,
             Self::Reference => "reference",
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn choices_are_read_as_they_are_shown() {
+        for text in ["best", "fastest", "reference", "GeForce RTX"] {
+            assert_eq!(text.parse::<AdapterChoice>().unwrap().to_string(), text);
+        }
+        assert_eq!("".parse(), Ok(AdapterChoice::Best));
     }
 }

@@ -9,6 +9,7 @@
 mod adapter;
 mod connectivity;
 mod error;
+mod gpu;
 mod light;
 mod reference;
 #[cfg(test)]
@@ -17,7 +18,10 @@ mod surface;
 mod target;
 mod view;
 
+use std::time::Duration;
+
 use self::connectivity::Connectivity;
+use self::gpu::Gpu;
 use self::reference::Reference;
 use self::reference::silhouette::MOST_EDGES;
 
@@ -66,6 +70,21 @@ pub trait Renderer: Send {
     /// # Errors
     /// As [`Self::loss`].
     fn picture(&mut self, surface: &Surface<'_>, target: usize) -> Result<Rendering, RenderError>;
+
+    /// Runs the passes of a loss one by one, each to its end: their names, and how long each took.
+    ///
+    /// # Errors
+    /// As [`Self::loss`].
+    fn pass_times(
+        &mut self,
+        surface: &Surface<'_>,
+        targets: &[usize],
+    ) -> Result<Vec<(&'static str, Duration)>, RenderError>;
+}
+
+/// Every graphics adapter that has a driver, the preferred first.
+pub fn adapters() -> Vec<Adapter> {
+    gpu::adapters()
 }
 
 /// Opens an adapter: the best, one by its name, or this program's own rasterizer.
@@ -73,12 +92,12 @@ pub trait Renderer: Send {
 /// # Errors
 /// [`RenderError::NoAdapter`], [`RenderError::NoSuchAdapter`], or [`RenderError::Device`] where the driver fails.
 pub fn open(choice: &AdapterChoice) -> Result<Box<dyn Renderer>, RenderError> {
-    match choice {
-        AdapterChoice::Best | AdapterChoice::Reference => Ok(Box::new(Reference::new())),
-        AdapterChoice::Named(name) => {
-            Err(RenderError::NoSuchAdapter { wanted: name.clone(), found: Vec::new() })
-        }
-    }
+    let in_software = || adapters().first().is_none_or(|adapter| adapter.kind >= AdapterKind::Software);
+    Ok(match choice {
+        AdapterChoice::Reference => Box::new(Reference::new()),
+        AdapterChoice::Fastest if in_software() => Box::new(Reference::new()),
+        choice => Box::new(Gpu::open(choice)?),
+    })
 }
 
 /// What is asked of every renderer's mesh and targets.

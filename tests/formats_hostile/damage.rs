@@ -11,13 +11,13 @@ use crate::seeds;
 
 /// Copies where nothing else is asked for; fewer where each is a file.
 const SHARE: u64 = 10_000;
-const SHARE_OF_FILES: u64 = 1_000;
+pub const SHARE_OF_FILES: u64 = 1_000;
 /// What a reader may take for a damaged copy of a small file.
 const MEMORY: usize = 8 << 20;
 const TIME: Duration = Duration::from_secs(5);
 
 /// Gives a reader damaged copies of all its files, as many to each as together make the number asked for.
-fn feed(reader: &str, files: &[Vec<u8>], share: u64, read: impl Fn(&[u8])) {
+pub fn feed(reader: &str, files: &[Vec<u8>], share: u64, read: impl Fn(&[u8])) {
     let asked =
         std::env::var("ONEMESH_FUZZ").ok().map(|count| count.parse().expect("ONEMESH_FUZZ is a count"));
     let rounds = asked.unwrap_or(share).div_ceil(files.len() as u64);

@@ -12,6 +12,11 @@ impl Clock {
         Self { repetitions: repetitions.max(1) }
     }
 
+    /// Runs of what takes tenths of a second.
+    pub fn runs(&self) -> usize {
+        4 * self.repetitions
+    }
+
     /// Prints the table's head.
     pub fn head(&self) {
         println!("| what | median | fastest | runs |\n|---|---:|---:|---:|");

@@ -2,9 +2,11 @@
 
 mod clients;
 mod clock;
+mod inverse;
 mod kernels;
 mod memory;
 mod readers;
+mod rendering;
 mod service;
 mod stages;
 mod upload;
@@ -28,7 +30,7 @@ const HEADS: usize = 12;
 /// Times kernels and stages on this machine, and prints a markdown table of medians.
 #[derive(Debug, clap::Args)]
 pub struct Bench {
-    /// Scans to fit, and collections (folders or manifests) to register; sculpted heads unless given
+    /// Scans to fit, and collections (folders or manifests) to register, or meshes to invert pictures of; sculpted unless given
     inputs: Vec<PathBuf>,
     /// Fewer repetitions, no template of 40962 vertices, no scan of a million triangles, a smaller sculpted collection
     #[arg(long)]
@@ -45,6 +47,8 @@ pub struct Bench {
     /// Leaves a part out; may be repeated
     #[arg(long, value_enum, value_name = "PART")]
     skip: Vec<Part>,
+    #[command(flatten)]
+    inverse: inverse::Inverse,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -61,11 +65,16 @@ enum Part {
     Collection,
     /// The sculpted collection through the service's jobs, from upload to results
     Service,
+    /// Pictures of sixteen views compared with targets, and the gradient
+    Rendering,
 }
 
 impl Bench {
     /// Does it.
     pub fn run(self) -> anyhow::Result<()> {
+        if self.inverse.is_asked() {
+            return self.inverse.run(&self.inputs);
+        }
         let (collections, scans): (Vec<PathBuf>, Vec<PathBuf>) =
             self.inputs.iter().cloned().partition(|path| is_collection(path));
         let sculpted = self.inputs.is_empty();
@@ -114,6 +123,9 @@ impl Bench {
             kernels::solves(&clock, finest);
             kernels::iteration(&clock);
             kernels::self_intersection(&clock);
+        }
+        if self.does(Part::Rendering) {
+            rendering::rendering(&clock)?;
         }
         Ok(())
     }

@@ -74,11 +74,8 @@ fn without_strays(silhouettes: &[Silhouette], cells: usize, agreement: f64) -> O
             .map(|(_, silhouette)| silhouette.clone())
             .collect();
         let hull = Hull::carve(&kept, cells, 0)?;
-        (hull.agreement() >= GOOD && hull.agreement() > agreement).then(|| Agreement {
-            hull,
-            strays,
-            suspicion: None,
-        })
+        let helps = hull.agreement() >= GOOD && hull.agreement() > agreement;
+        helps.then_some(Agreement { hull, strays, suspicion: None })
     })
 }
 

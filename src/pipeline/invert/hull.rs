@@ -1,9 +1,12 @@
 //! The visual hull: all of space that every camera sees inside its silhouette.
 
-use glam::{DMat3, DVec3};
+use std::collections::{HashMap, HashSet};
+
+use glam::{DMat3, DVec3, IVec3, Vec3Swizzles};
 use rayon::prelude::*;
 
 use super::silhouette::{Fall, Silhouette};
+use crate::mesh::{Topology, TriangleMesh};
 
 /// A cube of space.
 #[derive(Debug, Clone, Copy)]
@@ -61,6 +64,32 @@ impl Hull {
         self.cells.iter().any(|cell| (*cell - point).abs().max_element() <= self.half)
     }
 
+    /// Its surface: the cells' outer sides, rounded off. `None` where nothing is left.
+    pub fn surface(&self) -> Option<TriangleMesh> {
+        let low = self.cells.iter().copied().reduce(DVec3::min)?;
+        let side = 2.0 * self.half;
+        let place = |cell: &DVec3| ((*cell - low) / side).round().as_ivec3();
+        let filled: HashSet<IVec3> = self.cells.iter().map(place).collect();
+        let (mut corners, mut positions, mut triangles) = (HashMap::new(), Vec::new(), Vec::new());
+        for cell in &self.cells {
+            let at = place(cell);
+            for outward in SIDES.into_iter().filter(|outward| !filled.contains(&(at + *outward))) {
+                let [a, b, c, d] = square(outward).map(|corner| {
+                    *corners.entry(at + corner).or_insert_with(|| {
+                        positions.push(low + (at + corner).as_dvec3() * side - self.half);
+                        positions.len() as u32 - 1
+                    })
+                });
+                triangles.extend([[a, b, c], [a, c, d]]);
+            }
+        }
+        let topology = Topology::new(positions.len(), &triangles);
+        for _ in 0..ROUNDINGS {
+            positions = rounded(&topology, &positions);
+        }
+        TriangleMesh::new(positions, triangles).ok()
+    }
+
     /// A cube about what is left, a cell wider.
     fn bounds(&self) -> Option<Region> {
         let low = self.cells.iter().copied().reduce(DVec3::min)?;
@@ -93,6 +122,30 @@ impl Hull {
         let covered = (0..width * height).filter(held).filter(|&at| painted[at]).count();
         (covered as f64 / f64::from(silhouette.area().max(1)), beside as f64 / self.cells.len().max(1) as f64)
     }
+}
+
+/// How often the corners of the surface move to the middle of their neighbours.
+const ROUNDINGS: usize = 3;
+
+/// Outwards from the six sides of a cell.
+const SIDES: [IVec3; 6] = [IVec3::X, IVec3::NEG_X, IVec3::Y, IVec3::NEG_Y, IVec3::Z, IVec3::NEG_Z];
+
+/// The corners of a cell's side, each 0 or 1 along every axis, counter-clockwise as seen from outside.
+fn square(outward: IVec3) -> [IVec3; 4] {
+    let along = outward.abs();
+    let (across, up) = (along.zxy(), along.yzx());
+    let start = along * outward.max_element().max(0);
+    let around = [start, start + across, start + across + up, start + up];
+    if outward.max_element() > 0 { around } else { [around[0], around[3], around[2], around[1]] }
+}
+
+fn rounded(topology: &Topology, positions: &[DVec3]) -> Vec<DVec3> {
+    let at = |i: usize| {
+        let ring = topology.neighbours.row(i);
+        let sum: DVec3 = ring.iter().map(|&j| positions[j as usize]).sum();
+        if ring.is_empty() { positions[i] } else { 0.5 * (positions[i] + sum / ring.len() as f64) }
+    };
+    (0..positions.len()).map(at).collect()
 }
 
 /// What the silhouettes leave of a region.
@@ -173,4 +226,23 @@ fn nearest_to(lines: &[(DVec3, DVec3)]) -> Option<DVec3> {
 
 fn outer(v: DVec3) -> DMat3 {
     DMat3::from_cols(v * v.x, v * v.y, v * v.z)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_surface_of_some_cells_is_closed_and_faces_outwards() {
+        let cells = vec![DVec3::ZERO, DVec3::X, DVec3::new(1.0, 1.0, 0.0)];
+        let hull = Hull { cells, half: 0.5, covered: Vec::new(), beside: Vec::new() };
+        let surface = hull.surface().unwrap();
+        assert_eq!(surface.triangles().len(), 2 * (3 * 6 - 2 * 2));
+        assert!(Topology::of(&surface).on_rim.iter().all(|rim| !rim));
+        let volume: f64 = (surface.triangles().iter())
+            .map(|t| t.map(|i| surface.positions()[i as usize]))
+            .map(|[a, b, c]| a.dot(b.cross(c)) / 6.0)
+            .sum();
+        assert!(volume > 0.5 && volume < 3.0, "{volume}");
+    }
 }

@@ -27,7 +27,7 @@ use std::time::Instant;
 use glam::{DVec3, Vec3A};
 
 pub use error::InvertError;
-pub use pictures::{ViewPictures, contact_sheet};
+pub use pictures::ViewPictures;
 pub use report::{AdapterEntry, HullReport, InversionReport, ViewReport};
 pub use settings::{Albedo, InvertLevel, InvertPreset, InvertSettings, Smooth, What};
 pub use shown::Shown;
@@ -35,6 +35,8 @@ pub use unit_space::UnitSpace;
 pub use views::Views;
 
 use super::observer::{Observer, Stage, Watch};
+use super::register::fit_scan;
+use super::settings::{Preset, Settings};
 use super::sphere::Sphere;
 use crate::formats::Photograph;
 use crate::mesh::{Normals, TriangleMesh};
@@ -149,7 +151,7 @@ impl<'a> Scene<'a> {
         let mut done = 0;
         for level in &settings.levels {
             if state.positions.is_empty() {
-                state.positions = sphere.rest.iter().map(|p| *p * self.start_radius as f32).collect();
+                state.positions = self.start(&sphere, settings, watch.observer)?;
                 let painted = settings.albedo == Albedo::Vertex && shaded;
                 state.albedo = painted.then(|| vec![[1.0; 3]; state.positions.len()]);
             } else if level.level != sphere.level {
@@ -166,6 +168,22 @@ impl<'a> Scene<'a> {
             state = descent.finish();
         }
         Ok((sphere, state))
+    }
+
+    /// The shape before the first level.
+    fn start(
+        &self,
+        sphere: &Sphere,
+        settings: &InvertSettings,
+        observer: &dyn Observer,
+    ) -> Result<Vec<Vec3A>, InvertError> {
+        let surface = self.agreement.hull.surface().filter(|_| settings.hull_fit);
+        let Some(surface) = surface else {
+            return Ok(sphere.rest.iter().map(|p| *p * self.start_radius as f32).collect());
+        };
+        let fit = Settings::for_fit(Preset::Default, sphere.rest.len())?.fit;
+        let positions = fit_scan("hull", &surface, &fit, observer)?;
+        Ok(positions.into_iter().map(|p| self.space.to_unit(p)).collect())
     }
 
     /// The views that agree, at a level's size.

@@ -70,7 +70,7 @@ fn mean(value: &dyn Fn(usize) -> [f32; 3], [left, top]: [usize; 2], step: usize,
 }
 
 /// Target, rendering and difference of some views, spread over all of them.
-pub fn contact_sheet(title: &str, views: &[ViewPictures]) -> Image {
+pub(super) fn contact_sheet(title: &str, views: &[ViewPictures]) -> Image {
     let mut sheet = Sheet::new(title);
     for view in views.iter().step_by(views.len().div_ceil(MOST_ROWS).max(1)) {
         sheet.row([

@@ -55,6 +55,7 @@ impl InvertSettings {
             light_refresh: 25,
             most_views: 200,
             hull_cells: 80,
+            hull_fit: preset == InvertPreset::Default,
             start_radius: 1.0,
             levels,
         })
@@ -110,18 +111,22 @@ fn paper(level: u32, scene: &Scene) -> InvertLevel {
     }
 }
 
-/// Small pictures suffice while the mesh is coarse, and a few views at a time while it is far off.
+/// The hull gives the outlines, so that no level has far to go; small pictures and a few views at a time suffice while the
+/// mesh is coarse.
 fn coarse_to_fine(finest: u32) -> Vec<InvertLevel> {
-    let level = |(step, level): (usize, u32)| InvertLevel {
-        level,
-        size: [128, 256, 512, 512][step],
-        batch: 8,
-        iterations: [300, 200, 150, 150][step],
-        lambda: 19.0,
-        rate: [1e-2, 5e-3, 3e-3, 2e-3][step],
-        rate_end: 0.2,
-        density: if step == 0 { Density::Fading { uniform: 1.25 } } else { Density::Off },
-        smooth: Smooth::Off,
+    let level = |level: u32| {
+        let depth = level.saturating_sub(4) as usize;
+        InvertLevel {
+            level,
+            size: [256, 512, 512][depth],
+            batch: 8,
+            iterations: [200, 150, 150][depth],
+            lambda: 5.0,
+            rate: [5e-2, 2e-2, 1e-2][depth],
+            rate_end: 0.1,
+            density: Density::Off,
+            smooth: Smooth::Off,
+        }
     };
-    (COARSEST..=finest).enumerate().map(level).collect()
+    (finest.min(4)..=finest).map(level).collect()
 }

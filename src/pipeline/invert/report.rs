@@ -109,11 +109,10 @@ impl ViewReport {
     ) -> Self {
         let weight = |at: usize| target.weights.as_ref().map_or(1.0, |weights| f64::from(weights[at]));
         let (mut error, mut total, mut both, mut either) = (0.0, 0.0, 0.0, 0.0);
-        for at in 0..rendering.colours.len() {
+        for (at, (&drawn, &given)) in rendering.covered.iter().zip(object).enumerate() {
             let off = rendering.colours[at].iter().zip(&target.colours[at]);
             error += weight(at) * off.map(|(a, b)| f64::from((a - b).abs())).sum::<f64>() / 3.0;
             total += weight(at);
-            let (drawn, given) = (rendering.covered[at], object[at]);
             both += weight(at) * f64::from(u8::from(drawn && given));
             either += weight(at) * f64::from(u8::from(drawn || given));
         }

@@ -93,19 +93,19 @@ mod tests {
     use super::*;
 
     fn settings() -> InvertSettings {
-        InvertSettings::preset(InvertPreset::Default, 2562).unwrap()
+        InvertSettings::preset(InvertPreset::Default, 10242).unwrap()
     }
 
     #[test]
     fn parameters_are_set_by_name() {
         let mut settings = settings();
-        settings.set("levels.1.size", "300").unwrap();
+        settings.set("levels.0.size", "300").unwrap();
         settings.set("what", "world-normal").unwrap();
         settings.set("levels.0.smooth.laplacian.weight", "2").unwrap();
         settings
             .set("light", "[[1,1,1],[0,0,0],[0,-1,0],[0,0,0],[0,0,0],[0,0,0],[0,0,0],[0,0,0],[0,0,0]]")
             .unwrap();
-        assert_eq!((settings.levels[1].size, settings.what), (300, What::WorldNormal));
+        assert_eq!((settings.levels[0].size, settings.what), (300, What::WorldNormal));
         assert_eq!(settings.levels[0].smooth, Smooth::Laplacian { weight: 2.0 });
         let file = serde_json::json!({ "settings": settings }).to_string();
         assert_eq!(InvertSettings::from_json(file.as_bytes()).unwrap(), settings);
@@ -119,7 +119,7 @@ mod tests {
         assert!(complaint("levels.0.iterations", "9999999").contains("100000"));
         assert!(complaint("light", "[[1,2,3]]").contains("nine rows"));
         assert!(complaint("most_views", "1").contains("two views"));
-        assert!(complaint("levels.1.level", "5").contains("one finer"));
+        assert!(complaint("levels.1.level", "6").contains("one finer"));
         assert!(complaint("vertices", "642").contains("preset"));
         assert!(complaint("what", "colour").contains("silhouette"));
     }

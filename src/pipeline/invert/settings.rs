@@ -91,7 +91,9 @@ pub struct InvertSettings {
     pub most_views: usize,
     /// Cells along the longest side of the region that the silhouettes are carved from.
     pub hull_cells: usize,
-    /// Radius of the sphere at the start, in those of the ball with the hull's volume.
+    /// Whether the first level's sphere is fitted to the hull's surface as to a scan, before any picture is looked at.
+    pub hull_fit: bool,
+    /// Radius of the sphere otherwise, in those of the ball with the hull's volume.
     pub start_radius: f32,
     /// The levels in order, each on the same sphere as the one before or on its subdivision.
     pub levels: Vec<InvertLevel>,

@@ -18,6 +18,11 @@ impl UnitSpace {
         Pose { rotation: pose.rotation, translation }
     }
 
+    /// A point of the world in it.
+    pub fn to_unit(&self, point: DVec3) -> Vec3A {
+        ((point - self.centre) / self.radius).as_vec3a()
+    }
+
     /// A point of it in the world.
     pub fn to_world(&self, point: Vec3A) -> DVec3 {
         point.as_dvec3() * self.radius + self.centre
@@ -36,5 +41,6 @@ mod tests {
         let there = space.pose(&pose).to_camera(point.as_dvec3());
         let here = pose.to_camera(space.to_world(point));
         assert!((there * 120.0).distance(here) < 1e-4, "{there} {here}");
+        assert!(space.to_unit(space.to_world(point)).distance(point) < 1e-6);
     }
 }

@@ -3,11 +3,11 @@
 use glam::{Vec2, Vec3A};
 
 use super::corner::{Corner, doubled_area};
-use super::patch::Patch;
+use super::lamp::Lamp;
+use super::patch::{Patch, Weights};
 use super::raster::Raster;
 use super::shade::Looks;
 use super::silhouette::{Crossing, Silhouette};
-use crate::render::Light;
 
 /// The gradient with respect to one vertex.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -29,7 +29,7 @@ impl std::ops::AddAssign for VertexGradient {
 #[derive(Debug, Clone, Copy)]
 pub struct Pulled<'a> {
     pub projection: &'a [[f32; 4]; 3],
-    pub light: &'a Light,
+    pub lamp: &'a Lamp,
     pub raster: &'a Raster,
     /// `[H * W]`.
     pub gradient: &'a [Vec3A],
@@ -56,7 +56,7 @@ impl Pulled<'_> {
             let at = y * self.raster.width;
             for x in columns[0]..=columns[1] {
                 if self.raster.ids[at + x] == id {
-                    sums.add(&patch, x as i32, y as i32, looks, self.light, self.gradient[at + x]);
+                    sums.add(&patch, x as i32, y as i32, looks, self.lamp, self.gradient[at + x]);
                 }
             }
         }
@@ -108,29 +108,27 @@ struct Sums {
 
 impl Sums {
     #[inline]
-    fn add(&mut self, patch: &Patch, x: i32, y: i32, looks: &Looks, light: &Light, upstream: Vec3A) {
+    fn add(&mut self, patch: &Patch, x: i32, y: i32, looks: &Looks, lamp: &Lamp, upstream: Vec3A) {
         let weights = patch.at(x, y);
         let (normal, inverse_length) = looks.normal(&weights);
         let mut by_weight = [0.0; 3];
         let mut lit = upstream;
         if let Some(albedo) = looks.albedo {
-            let of_albedo = upstream * Vec3A::from_array(light.colour(normal));
-            for k in 0..3 {
-                self.albedo[k] += of_albedo * weights.corners[k];
-                by_weight[k] = of_albedo.dot(albedo[k]);
-            }
+            let of_albedo = upstream * lamp.colour(normal);
+            add_weighted(&mut self.albedo, of_albedo, &weights);
+            by_weight = albedo.map(|corner| of_albedo.dot(corner));
             lit *= weights.mean(albedo);
         }
-        let of_unit = light.pull_back(normal, lit.to_array());
+        let of_unit = lamp.pull_back(normal, lit);
         let of_normal = (of_unit - normal * normal.dot(of_unit)) * inverse_length;
-        for k in 0..3 {
-            self.normals[k] += of_normal * weights.corners[k];
-            by_weight[k] += of_normal.dot(looks.normals[k]);
-        }
+        add_weighted(&mut self.normals, of_normal, &weights);
         if patch.is_wide {
-            let mean: f32 = (0..3).map(|k| by_weight[k] * weights.corners[k]).sum();
-            for k in 0..3 {
-                self.moments[k] += weights.from * ((by_weight[k] - mean) * weights.inverse_sum);
+            let by_weight = Vec3A::from_array(by_weight)
+                + Vec3A::from_array(looks.normals.map(|corner| of_normal.dot(corner)));
+            let mean = by_weight.dot(Vec3A::from_array(weights.corners));
+            let of_a = (by_weight - mean) * weights.inverse_sum;
+            for (moment, of_a) in self.moments.iter_mut().zip(of_a.to_array()) {
+                *moment += weights.from * of_a;
             }
         }
     }
@@ -146,6 +144,14 @@ impl Sums {
             let position = pull_back_projection(projection, h);
             VertexGradient { position, normal: self.normals[k], albedo: self.albedo[k] }
         })
+    }
+}
+
+/// Adds a gradient with respect to a weighted mean to those with respect to what the corners have.
+#[inline]
+fn add_weighted(sums: &mut [Vec3A; 3], upstream: Vec3A, weights: &Weights) {
+    for (sum, weight) in sums.iter_mut().zip(weights.corners) {
+        *sum += upstream * weight;
     }
 }
 

@@ -2,6 +2,7 @@ use glam::Vec3A;
 
 use super::backward::{Pulled, VertexGradient};
 use super::corner::{Corner, project};
+use super::lamp::Lamp;
 use super::loss;
 use super::raster::Raster;
 use super::shade::{Looks, shade};
@@ -18,56 +19,80 @@ pub struct Frame {
     pub colours: Vec<Vec3A>,
     pub marks: Marks,
     pub crossings: Vec<(Silhouette, Crossing)>,
-    /// The same blended along silhouettes; after the loss its gradient.
+    /// The same colours blended along silhouettes; after the loss its gradient with respect to them.
     pub picture: Vec<Vec3A>,
     /// The gradient with respect to `colours`.
     pub unblended: Vec<Vec3A>,
+    /// sum w |R - I|.
+    pub value: f64,
 }
 
+/// What every pass over a view is given.
+#[derive(Debug, Clone, Copy)]
+pub struct Job<'a> {
+    pub mesh: &'a Connectivity,
+    pub surface: &'a Surface<'a>,
+    pub target: &'a Target,
+    /// 1 / (3 sum w).
+    pub scale: f32,
+}
+
+/// One pass over a view, which may add to the gradient `[N]`.
+type Pass = fn(&mut Frame, Job<'_>, &mut Vec<VertexGradient>);
+
 impl Frame {
+    /// The passes of a loss in their order.
+    pub const PASSES: [(&'static str, Pass); 7] = [
+        ("project", |frame, job, _| frame.project(job)),
+        ("raster", |frame, job, _| frame.raster(job)),
+        ("shade", |frame, job, _| frame.shade(job)),
+        ("silhouette", |frame, job, _| frame.silhouette(job)),
+        ("loss", |frame, job, _| frame.loss(job)),
+        ("backward", Self::backward),
+        ("silhouette_backward", |frame, job, gradient| frame.silhouette_backward(job, gradient)),
+    ];
+
     /// Draws a surface as a target's camera sees it.
-    pub fn draw(&mut self, mesh: &Connectivity, surface: &Surface<'_>, target: &Target) {
-        let Self { corners, raster, colours, marks, crossings, picture, .. } = self;
-        project(&target.view.projection(), surface.positions, corners);
-        raster.draw(target.view.size(), corners, &mesh.triangles, mesh.closed);
-        shade(raster, corners, &mesh.triangles, surface, &target.light, target.background, colours);
-        mark(raster, corners, &mesh.edges, marks, crossings);
-        loss::blend(colours, crossings, picture);
+    pub fn draw(&mut self, job: Job<'_>) {
+        self.project(job);
+        self.raster(job);
+        self.shade(job);
+        self.silhouette(job);
     }
 
-    /// Draws, compares, and sets `gradient` `[N]`, scaled. Returns sum w |R - I|.
-    pub fn loss(
-        &mut self,
-        mesh: &Connectivity,
-        surface: &Surface<'_>,
-        target: &Target,
-        scale: f32,
-        gradient: &mut Vec<VertexGradient>,
-    ) -> f64 {
-        self.draw(mesh, surface, target);
-        let value = loss::loss(&mut self.picture, &target.colours, target.weights.as_deref(), scale);
+    fn project(&mut self, Job { target, surface, .. }: Job<'_>) {
+        project(&target.view.projection(), surface.positions, &mut self.corners);
+    }
+
+    fn raster(&mut self, Job { mesh, target, .. }: Job<'_>) {
+        self.raster.draw(target.view.size(), &self.corners, &mesh.triangles, mesh.closed);
+    }
+
+    fn shade(&mut self, Job { mesh, surface, target, .. }: Job<'_>) {
+        let Self { corners, raster, colours, .. } = self;
+        shade(raster, corners, &mesh.triangles, surface, &target.light, target.background, colours);
+    }
+
+    fn silhouette(&mut self, Job { mesh, .. }: Job<'_>) {
+        mark(&self.raster, &self.corners, &mesh.edges, &mut self.marks, &mut self.crossings);
+        loss::blend(&self.colours, &self.crossings, &mut self.picture);
+    }
+
+    fn loss(&mut self, Job { target, scale, .. }: Job<'_>) {
+        self.value = loss::loss(&mut self.picture, &target.colours, target.weights.as_deref(), scale);
         loss::unblend(&self.picture, &self.crossings, &mut self.unblended);
+    }
+
+    fn pulled<'a>(&'a self, lamp: &'a Lamp, projection: &'a [[f32; 4]; 3]) -> Pulled<'a> {
+        Pulled { projection, lamp, raster: &self.raster, gradient: &self.unblended }
+    }
+
+    fn backward(&mut self, job: Job<'_>, gradient: &mut Vec<VertexGradient>) {
+        let Job { mesh, surface, target, .. } = job;
         gradient.clear();
         gradient.resize(mesh.vertices, VertexGradient::default());
-        let projection = target.view.projection();
-        let pulled = Pulled {
-            projection: &projection,
-            light: &target.light,
-            raster: &self.raster,
-            gradient: &self.unblended,
-        };
-        self.pull_triangles(mesh, surface, &pulled, gradient);
-        self.pull_edges(mesh, &pulled, gradient);
-        value
-    }
-
-    fn pull_triangles(
-        &self,
-        mesh: &Connectivity,
-        surface: &Surface<'_>,
-        pulled: &Pulled<'_>,
-        gradient: &mut [VertexGradient],
-    ) {
+        let (lamp, projection) = (Lamp::new(&target.light), target.view.projection());
+        let pulled = self.pulled(&lamp, &projection);
         for (id, &ends) in (1..).zip(&mesh.triangles) {
             let corners = ends.map(|end| &self.corners[end as usize]);
             let looks = Looks::new(surface, ends);
@@ -79,7 +104,9 @@ impl Frame {
         }
     }
 
-    fn pull_edges(&self, mesh: &Connectivity, pulled: &Pulled<'_>, gradient: &mut [VertexGradient]) {
+    fn silhouette_backward(&self, Job { mesh, target, .. }: Job<'_>, gradient: &mut [VertexGradient]) {
+        let (lamp, projection) = (Lamp::new(&target.light), target.view.projection());
+        let pulled = self.pulled(&lamp, &projection);
         for crossings in self.crossings.chunk_by(|(_, one), (_, next)| one.edge == next.edge) {
             let (mut sum, mut sum_along) = (0.0, 0.0);
             for (_, crossing) in crossings {

@@ -5,6 +5,7 @@ pub(super) mod backward;
 pub(super) mod corner;
 pub(super) mod frame;
 pub(super) mod gather;
+pub(super) mod lamp;
 pub(super) mod loss;
 pub(super) mod patch;
 pub(super) mod raster;
@@ -14,11 +15,12 @@ pub(super) mod silhouette;
 mod tests;
 
 use std::sync::{Mutex, PoisonError};
+use std::time::{Duration, Instant};
 
 use rayon::prelude::*;
 
 use self::backward::VertexGradient;
-use self::frame::Frame;
+use self::frame::{Frame, Job};
 use super::connectivity::Connectivity;
 use super::{
     Adapter, AdapterKind, Light, MeshLayout, RenderError, RenderGradient, Renderer, Rendering, Surface,
@@ -115,7 +117,13 @@ impl Renderer for Reference {
         let values: Vec<f64> = (targets.par_iter().zip(&mut gradients))
             .with_max_len(1)
             .map(|(target, gradient)| {
-                self.with_frame(|frame| frame.loss(mesh, surface, target, total.recip() as f32, gradient))
+                let job = Job { mesh, surface, target, scale: total.recip() as f32 };
+                self.with_frame(|frame| {
+                    for (_, pass) in Frame::PASSES {
+                        pass(frame, job, gradient);
+                    }
+                    frame.value
+                })
             })
             .collect();
         gather::gather(&gradients, surface.albedo.is_some(), gradient);
@@ -128,12 +136,44 @@ impl Renderer for Reference {
         surface.check(mesh.vertices)?;
         let target = self.target(target)?;
         Ok(self.with_frame(|frame| {
-            frame.draw(mesh, surface, target);
+            frame.draw(Job { mesh, surface, target, scale: 0.0 });
             Rendering {
                 size: target.view.size(),
                 colours: frame.picture.iter().map(|colour| colour.to_array()).collect(),
                 covered: frame.raster.ids.iter().map(|&id| id != 0).collect(),
             }
         }))
+    }
+
+    fn pass_times(
+        &mut self,
+        surface: &Surface<'_>,
+        targets: &[usize],
+    ) -> Result<Vec<(&'static str, Duration)>, RenderError> {
+        let mesh = self.mesh()?;
+        surface.check(mesh.vertices)?;
+        let targets = targets.iter().map(|&index| self.target(index)).collect::<Result<Vec<_>, _>>()?;
+        let mut frames = vec![Frame::default(); targets.len()];
+        let mut gradients = vec![Vec::new(); targets.len()];
+        let mut times = Vec::new();
+        for (name, pass) in Frame::PASSES {
+            let run = |((frame, gradient), target): ((&mut Frame, &mut Vec<_>), &&Target)| {
+                pass(frame, Job { mesh, surface, target, scale: 1.0 }, gradient)
+            };
+            // Once before, for memory that is asked for.
+            for last in [false, true] {
+                let begun = Instant::now();
+                (frames.par_iter_mut().zip(&mut gradients)).zip(&targets).with_max_len(1).for_each(run);
+                if last {
+                    times.push((name, begun.elapsed()));
+                }
+            }
+        }
+        let mut gradient = RenderGradient::default();
+        gradient.clear(mesh.vertices, surface.albedo.is_some());
+        let begun = Instant::now();
+        gather::gather(&gradients, surface.albedo.is_some(), &mut gradient);
+        times.push(("gather", begun.elapsed()));
+        Ok(times)
     }
 }

@@ -3,6 +3,7 @@
 use glam::Vec3A;
 
 use super::corner::Corner;
+use super::lamp::Lamp;
 use super::patch::{Patch, Weights};
 use super::raster::Raster;
 use crate::render::{Light, Surface};
@@ -44,6 +45,7 @@ pub fn shade(
     background: [f32; 3],
     colours: &mut Vec<Vec3A>,
 ) {
+    let lamp = Lamp::new(light);
     colours.clear();
     colours.resize(raster.ids.len(), Vec3A::from_array(background));
     let rows = raster.ids.chunks_exact(raster.width).zip(colours.chunks_exact_mut(raster.width));
@@ -52,18 +54,16 @@ pub fn shade(
         for (x, (&id, colour)) in ids.iter().zip(colours).enumerate().filter(|(_, (id, _))| **id != 0) {
             let (x, y) = (x as i32, y as i32);
             // Neighbours mostly see the same triangle.
-            let (_, patch, looks) = match last {
-                Some(last @ (seen, ..)) if seen == id => last,
-                _ => {
-                    let ends = triangles[id as usize - 1];
-                    let patch = Patch::new([x, y], ends.map(|end| &corners[end as usize]));
-                    *last.insert((id, patch, Looks::new(surface, ends)))
-                }
-            };
+            if last.as_ref().is_none_or(|(seen, ..)| *seen != id) {
+                let ends = triangles[id as usize - 1];
+                let patch = Patch::new([x, y], ends.map(|end| &corners[end as usize]));
+                last = Some((id, patch, Looks::new(surface, ends)));
+            }
+            let Some((_, patch, looks)) = &last else { continue };
             let weights = patch.at(x, y);
             let (normal, _) = looks.normal(&weights);
             let albedo = looks.albedo.map_or(Vec3A::ONE, |albedo| weights.mean(albedo));
-            *colour = albedo * Vec3A::from_array(light.colour(normal));
+            *colour = albedo * lamp.colour(normal);
         }
     }
 }
