@@ -1,6 +1,6 @@
 # Works from a fresh checkout on Debian: what is missing is installed first, as root or by sudo.
 
-.PHONY: demo test durability contract bench service-cost licences openapi templates pictures rust validator schemathesis vulkan
+.PHONY: demo test durability contract bench service-cost service-load licences openapi templates pictures rust validator schemathesis vulkan
 
 # The demo collection, registered by a server of its own: meshes, report and picture.
 demo: rust vulkan
@@ -23,6 +23,13 @@ bench: rust vulkan
 service-cost: rust
 	cargo build --release --locked
 	scripts/service_cost $${CARGO_TARGET_DIR:-target}/release/onemesh
+
+# How long answers take while 500 clients watch two registrations; what an upload of a million triangles takes; whether
+# memory grows over 1000 registrations. Minutes, on a quiet machine.
+service-load: rust
+	cargo build --release --locked
+	for what in "--clients 500" "--upload 1000000" "--soak 1000"; do \
+		$${CARGO_TARGET_DIR:-target}/release/onemesh bench $$what || exit 1; done
 
 # The head that comes with the program, from the sphere and from other heads than the demo's.
 templates: rust

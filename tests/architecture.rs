@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Crates that only some files may name, and where.
-const KEPT: [(&str, &[&str]); 21] = [
+const KEPT: [(&str, &[&str]); 25] = [
     ("nalgebra_sparse", &["numeric/cholesky.rs"]),
     ("clap", &["cli/", "main.rs"]),
     ("anyhow", &["cli/"]),
@@ -24,6 +24,10 @@ const KEPT: [(&str, &[&str]); 21] = [
     ("apalis_sqlite", &["job/queue.rs"]),
     ("lru", &["job/cache.rs"]),
     ("postcard", &["pipeline/state.rs"]),
+    ("opentelemetry", &["cli/span_export.rs"]),
+    ("opentelemetry_sdk", &["cli/span_export.rs"]),
+    ("opentelemetry_otlp", &["cli/span_export.rs"]),
+    ("tracing_opentelemetry", &["cli/span_export.rs"]),
     ("wgpu", &["render/"]),
     ("bytemuck", &["render/"]),
     ("pollster", &["render/"]),

@@ -22,6 +22,8 @@ mod progress;
 mod register;
 mod serve;
 mod service_config;
+#[cfg(feature = "otel")]
+mod span_export;
 mod submit;
 mod summary;
 mod template;

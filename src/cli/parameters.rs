@@ -21,6 +21,9 @@ pub struct Parameters {
     /// Sets one parameter by its dotted name, as in `groupwise.rounds=3` or `fit.levels.0.lambda=6`; may be repeated
     #[arg(long, value_name = "NAME=VALUE")]
     set: Vec<String>,
+    /// How much a landmark counts where the template's are averaged, as in `30=10`; 1 unless said; may be repeated
+    #[arg(long, value_name = "NAME=WEIGHT", value_parser = weight)]
+    landmark_weight: Vec<(String, f64)>,
 }
 
 #[derive(Debug, Clone, Copy, clap::ValueEnum)]
@@ -80,8 +83,16 @@ impl Parameters {
                 .with_context(|| format!("--set {assignment}: write it as NAME=VALUE"))?;
             settings.set(name, value).with_context(|| format!("--set {assignment}"))?;
         }
+        settings.resample.weights.extend(self.landmark_weight.iter().cloned());
         Ok(settings)
     }
+}
+
+fn weight(text: &str) -> Result<(String, f64), &'static str> {
+    // Landmarks may have any name.
+    let (name, weight) = text.rsplit_once('=').ok_or("write it as NAME=WEIGHT")?;
+    let weight = weight.parse().ok().filter(|weight| (0.0..=1e9).contains(weight));
+    Ok((name.to_owned(), weight.ok_or("a weight is a number from 0 to 1e9")?))
 }
 
 fn from_file(file: &PathBuf) -> anyhow::Result<Settings> {

@@ -27,12 +27,12 @@ impl Serve {
             print!("{}", config.to_toml());
             return Ok(());
         }
-        logging::start(&config.log)?;
+        let _logging = logging::start(&config.log)?;
         let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().build();
         runtime.context("no threads can be started")?.block_on(async {
             let service = Service::open(config).await?;
             println!("listening on http://{}", service.address());
-            service.run(stop()).await?;
+            service.run(stop()).await;
             Ok(())
         })
     }

@@ -17,7 +17,7 @@ use super::client::{
 use super::difference::difference;
 use super::parameters::Parameters;
 use super::summary::Summary;
-use super::template::TemplateFiles;
+use super::template::{SentTemplate, TemplateFiles};
 
 /// Scans that are sent at the same time.
 const AT_ONCE: usize = 4;
@@ -53,8 +53,7 @@ impl Submit {
         refused.iter().for_each(|refused| eprintln!("{}: left out: {}", refused.name, refused.error));
         spare_inputs(&self.output, collection.members())?;
         let client = self.server.reach()?;
-        let template =
-            template.map(|(mesh, landmarks)| send_template(&client, &mesh, landmarks)).transpose()?;
+        let template = template.map(|template| send_template(&client, &template)).transpose()?;
         let scans = send_scans(&client, collection.members())?;
         ensure!(!scans.is_empty(), "{}: no scan is left to register", self.collection.display());
         let left_out = refused.len() + collection.members().len() - scans.len();
@@ -71,35 +70,50 @@ impl Submit {
         let document = |settings: &Settings| serde_json::to_value(settings);
         if let Some(frozen) = self.template.read()?.settings {
             let wanted = self.parameters.over_frozen(frozen.clone())?;
-            let parameters = difference(&document(&frozen)?, &document(&wanted)?);
-            return Ok(Asked { parameters, ..Asked::default() });
+            let (base, landmark_weights) = with_weights(frozen, &wanted);
+            let parameters = difference(&document(&base)?, &document(&wanted)?);
+            return Ok(Asked { parameters, landmark_weights, ..Asked::default() });
         }
         let wanted = self.parameters.for_registration()?;
         let base = Settings::preset(wanted.preset, wanted.vertices)?;
+        let (base, landmark_weights) = with_weights(base, &wanted);
         let preset = document(&wanted)?["preset"].as_str().map(str::to_owned);
         let parameters = difference(&document(&base)?, &document(&wanted)?);
-        Ok(Asked { preset, vertices: Some(wanted.vertices), parameters, ..Asked::default() })
+        let vertices = Some(wanted.vertices);
+        Ok(Asked { preset, vertices, parameters, landmark_weights, ..Asked::default() })
     }
 }
 
+/// Settings that weigh landmarks as those that are wanted, and the weights that make the difference.
+fn with_weights(mut base: Settings, wanted: &Settings) -> (Settings, BTreeMap<String, f64>) {
+    let known = std::mem::replace(&mut base.resample.weights, wanted.resample.weights.clone());
+    let differ = |(name, weight): &(&String, &f64)| known.get(*name) != Some(weight);
+    let weights = wanted.resample.weights.iter().filter(differ);
+    (base, weights.map(|(name, weight)| (name.clone(), *weight)).collect())
+}
+
 /// Sends a template of the user's, and gives its id.
-fn send_template(client: &Client, path: &Path, landmarks: Option<PathBuf>) -> anyhow::Result<String> {
+fn send_template(client: &Client, files: &SentTemplate) -> anyhow::Result<String> {
     #[derive(Deserialize)]
     struct Template {
         id: String,
     }
-    let (mesh, _) = MeshUpload::read(path)?;
-    let landmarks = landmarks.map(|path| fs::read(&path).with_context(|| path.display().to_string()));
-    let landmarks = landmarks.transpose()?;
+    let (mesh, _) = MeshUpload::read(&files.mesh)?;
+    let read = |path: &PathBuf| fs::read(path).with_context(|| path.display().to_string());
+    let landmarks = files.landmarks.as_ref().map(read).transpose()?;
+    let mask = files.mask.as_ref().map(read).transpose()?;
     let template: Result<Template, _> = client.patience.persist(|| {
         let mut form = Form::new().mesh(&mesh)?;
         if let Some(landmarks) = &landmarks {
             form = form.file("landmarks", landmarks);
         }
+        if let Some(mask) = &mask {
+            form = form.file("mask", mask);
+        }
         let content_type = form.content_type();
         json(client.post("/v1/templates", &[("content-type", &content_type)], form.into_body())?)
     });
-    Ok(template.with_context(|| path.display().to_string())?.id)
+    Ok(template.with_context(|| files.mesh.display().to_string())?.id)
 }
 
 /// Refuses an output folder in which results would take the place of scans.

@@ -30,6 +30,16 @@ pub struct GivenTemplate {
     pub source: Option<MeshSource>,
 }
 
+/// The files of a template for a server.
+pub struct SentTemplate {
+    /// The mesh.
+    pub mesh: PathBuf,
+    /// Its landmarks; a frozen collection holds its own.
+    pub landmarks: Option<PathBuf>,
+    /// Its mask.
+    pub mask: Option<PathBuf>,
+}
+
 impl TemplateFiles {
     /// Reads it, where one is given.
     pub fn read(&self) -> anyhow::Result<GivenTemplate> {
@@ -49,17 +59,12 @@ impl TemplateFiles {
         })
     }
 
-    /// Its files for a server, where one is given: the mesh, and its landmarks unless it is a frozen collection, which
-    /// holds its own.
-    pub fn files(&self) -> anyhow::Result<Option<(PathBuf, Option<PathBuf>)>> {
+    /// Its files for a server, where one is given.
+    pub fn files(&self) -> anyhow::Result<Option<SentTemplate>> {
         let Some(path) = &self.template else { return Ok(None) };
-        ensure!(
-            self.template_mask.is_none(),
-            "--template-mask: servers take none; use `register`, or the template.frozen.glb of a collection with the mask"
-        );
         let frozen = self.read()?.settings.is_some();
-        let landmarks = self.template_landmarks.clone().or_else(|| beside(path));
-        Ok(Some((path.clone(), landmarks.filter(|_| !frozen))))
+        let landmarks = self.template_landmarks.clone().or_else(|| beside(path)).filter(|_| !frozen);
+        Ok(Some(SentTemplate { mesh: path.clone(), landmarks, mask: self.template_mask.clone() }))
     }
 
     fn of_mesh(&self, source: MeshSource, path: &Path) -> anyhow::Result<GivenTemplate> {

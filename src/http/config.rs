@@ -7,7 +7,9 @@ use std::time::Duration;
 use serde::{Deserialize, Serialize};
 
 use crate::job::JobSettings;
+use crate::job::capture::CaptureLimits;
 use crate::job::scan::ScanLimits;
+use crate::render::AdapterChoice;
 
 /// Everything that can be set about the service, with its defaults: a TOML file has the same names.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -37,6 +39,8 @@ pub struct ServerConfig {
     pub listen: SocketAddr,
     /// Whether API keys are needed.
     pub keys: KeyPolicy,
+    /// Seconds that a client may take to send the head of a request, from the connection or the answer before on.
+    pub header_seconds: u64,
     /// Seconds that a client may take to send the next piece of a body.
     pub body_idle_seconds: u64,
     /// Seconds that requests under way have to end when the server does.
@@ -71,6 +75,8 @@ pub struct DataConfig {
 pub struct Limits {
     /// How large a scan may be.
     pub scan: ScanLimits,
+    /// How large pictures with cameras may be.
+    pub capture: CaptureLimits,
     /// How many registrations there may be.
     pub registration: RegistrationLimits,
     /// How often may be asked.
@@ -99,6 +105,9 @@ pub struct WorkConfig {
     pub threads: usize,
     /// Bytes of scans that are kept ready between steps.
     pub cache_bytes: usize,
+    /// What draws inverse renderings: `best`, `fastest`, `reference` for the program's own rasterizer, or a
+    /// part of an adapter's name.
+    pub adapter: String,
 }
 
 /// How often may be asked.
@@ -163,7 +172,8 @@ pub enum LogFormat {
 impl Default for ServerConfig {
     fn default() -> Self {
         let listen = SocketAddr::from(([127, 0, 0, 1], 8080));
-        Self { listen, keys: KeyPolicy::Auto, body_idle_seconds: 60, shutdown_seconds: 20 }
+        let keys = KeyPolicy::Auto;
+        Self { listen, keys, header_seconds: 30, body_idle_seconds: 60, shutdown_seconds: 20 }
     }
 }
 
@@ -181,7 +191,7 @@ impl Default for RegistrationLimits {
 
 impl Default for WorkConfig {
     fn default() -> Self {
-        Self { threads: 0, cache_bytes: 1 << 30 }
+        Self { threads: 0, cache_bytes: 1 << 30, adapter: AdapterChoice::Best.to_string() }
     }
 }
 
@@ -251,6 +261,9 @@ impl From<&Config> for JobSettings {
             keep_free: config.data.keep_free_bytes,
             keep: config.retention.registrations(),
             scan_limits: config.limits.scan,
+            capture_limits: config.limits.capture,
+            // Every text is a choice.
+            adapter: config.work.adapter.parse().unwrap_or_default(),
             ..usual
         }
     }

@@ -15,13 +15,15 @@ use super::wire::registration::EventView;
 #[openapi(
     info(
         title = "onemesh",
-        description = "One mesh for every face: registers collections of 3D face scans onto one shared triangle mesh.\n\n\
+        description = "One mesh for every face: registers collections of 3D face scans onto one shared triangle mesh, and makes \
+            meshes from pictures with cameras.\n\n\
             Upload scans with their landmarks, ask for a registration, follow its events, download the results.",
     ),
     tags(
         (name = "scans", description = "Surfaces to be registered, with their landmarks, masks and textures."),
         (name = "templates", description = "What results take their triangles from."),
         (name = "registrations", description = "Work that is asked for, watched and stopped."),
+        (name = "inverse renderings", description = "Meshes from pictures with cameras: asked for, watched and stopped."),
         (name = "results", description = "What registrations leave. It never changes."),
         (name = "service", description = "The service itself."),
     ),

@@ -12,17 +12,22 @@ use prometheus_client::registry::{Registry, Unit};
 /// Bounds of how long requests take, in seconds.
 const REQUEST_SECONDS: [f64; 12] = [0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 5.0, 30.0];
 
+/// Bounds of scans' mean distances from their results, in the scan's radius.
+const RESIDUALS: [f64; 10] = [1e-4, 2e-4, 5e-4, 1e-3, 2e-3, 5e-3, 1e-2, 2e-2, 5e-2, 0.1];
+
 /// What is counted, for Prometheus.
 pub struct Metrics {
     registry: Registry,
     requests: Family<RequestLabels, Counter>,
     seconds: Family<RouteLabels, Histogram, fn() -> Histogram>,
-    /// Registrations by status.
-    pub registrations: Family<StatusLabels, Gauge>,
+    /// Jobs by kind and status.
+    pub jobs: Family<JobLabels, Gauge>,
     /// Steps that could run or run.
     pub steps: Family<StatusLabels, Gauge>,
     stage_steps: Family<StageLabels, Counter>,
     stage_seconds: Family<StageLabels, Counter<f64, AtomicU64>>,
+    /// Scans' mean distances from their results, in the scan's radius.
+    pub residuals: Histogram,
     /// Bytes free on the data folder's disk.
     pub free_bytes: Gauge<f64, AtomicU64>,
 }
@@ -45,6 +50,15 @@ struct StageLabels {
     stage: &'static str,
 }
 
+/// A kind of job and a status.
+#[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
+pub struct JobLabels {
+    /// The kind's name.
+    pub kind: &'static str,
+    /// The status' name.
+    pub status: &'static str,
+}
+
 /// A status.
 #[derive(Debug, Clone, PartialEq, Eq, Hash, EncodeLabelSet)]
 pub struct StatusLabels {
@@ -61,8 +75,8 @@ impl Metrics {
         let seconds = Family::<_, _, fn() -> _>::new_with_constructor(|| Histogram::new(REQUEST_SECONDS));
         let help = "Time to an answer's head";
         registry.register_with_unit("http_request_duration", help, Unit::Seconds, seconds.clone());
-        let registrations = Family::default();
-        registry.register("registrations", "Registrations by status", registrations.clone());
+        let jobs = Family::default();
+        registry.register("jobs", "Jobs by kind and status", jobs.clone());
         let steps = Family::default();
         registry.register("steps", "Steps of work that wait for a thread or run", steps.clone());
         let stage_steps = Family::default();
@@ -70,10 +84,13 @@ impl Metrics {
         let stage_seconds = Family::default();
         let help = "Time that they took";
         registry.register_with_unit("stage", help, Unit::Seconds, stage_seconds.clone());
+        let residuals = Histogram::new(RESIDUALS);
+        let help = "Mean distance of each registered scan from its result, in the scan's radius";
+        registry.register("residual", help, residuals.clone());
         let free_bytes = Gauge::default();
         let help = "Free on the data folder's disk";
         registry.register_with_unit("data_folder_free", help, Unit::Bytes, free_bytes.clone());
-        Self { registry, requests, seconds, registrations, steps, stage_steps, stage_seconds, free_bytes }
+        Self { registry, requests, seconds, jobs, steps, stage_steps, stage_seconds, residuals, free_bytes }
     }
 
     /// Counts a request: by its route, not its path, so that there are few series.

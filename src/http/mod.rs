@@ -3,11 +3,15 @@
 mod app;
 mod auth;
 mod blob_answer;
+mod capture_upload;
 pub mod config;
 mod config_source;
+mod connections;
 mod document;
+mod event_stream;
 mod extract;
 mod idempotency;
+mod job_answer;
 mod metrics;
 mod observe;
 mod page;

@@ -79,6 +79,8 @@ kinds! {
     Internal = "internal-error", INTERNAL_SERVER_ERROR, "The server failed";
     /// Nothing can be kept for now.
     StorageUnavailable = "storage-unavailable", SERVICE_UNAVAILABLE, "Nothing can be kept for now";
+    /// Nothing draws pictures.
+    NoAdapter = "no-adapter", SERVICE_UNAVAILABLE, "No graphics adapter was found";
     /// The server is about to end.
     ShuttingDown = "shutting-down", SERVICE_UNAVAILABLE, "The server is about to end";
 }

@@ -3,9 +3,12 @@
 use super::problem::{Kind, Problem};
 use crate::job::JobError;
 use crate::job::StoreError;
+use crate::job::capture::CaptureFault;
 use crate::job::scan::{ScanError, ScanFault};
 use crate::job::template::TemplateError;
 
+/// What whoever runs the server does where nothing draws.
+const DRIVER: &str = "whoever runs the server must install a Vulkan driver, as by `apt install mesa-vulkan-drivers`, or set `work.adapter` to `reference`";
 /// Seconds until a full disk is worth another try.
 const STORAGE_RETRY: u64 = 60;
 
@@ -53,6 +56,19 @@ impl From<ScanFault> for Problem {
     }
 }
 
+impl From<CaptureFault> for Problem {
+    fn from(fault: CaptureFault) -> Self {
+        match fault {
+            CaptureFault::Unfit { problem } => Self::of_field(Kind::UnreadableFile, "capture", problem, ""),
+            CaptureFault::TooLarge { what, found, limit, remedy } => {
+                let finding = format!("{what} {found}; at most {limit} are taken");
+                Self::of_field(Kind::LimitExceeded, "capture", finding, remedy)
+            }
+            CaptureFault::Scratch(error) => StoreError::Folder { path: "uploads".into(), error }.into(),
+        }
+    }
+}
+
 impl From<ScanError> for Problem {
     fn from(error: ScanError) -> Self {
         match error {
@@ -79,6 +95,10 @@ impl From<JobError> for Problem {
     fn from(error: JobError) -> Self {
         match error {
             JobError::Invalid { field, problem } => Self::of_field(Kind::InvalidField, field, problem, ""),
+            JobError::Capture(fault) => fault.into(),
+            JobError::NoAdapter(finding) => {
+                Self::new(Kind::NoAdapter, finding).remedied(DRIVER).retry_after(STORAGE_RETRY)
+            }
             JobError::NotFound(_) => Self::not_found(error),
             JobError::Conflict(_) => Self::new(Kind::Conflict, error),
             JobError::TooMany(_) => Self::new(Kind::TooManyJobs, error)

@@ -3,11 +3,11 @@ use std::net::SocketAddr;
 use std::sync::Arc;
 use std::time::Duration;
 
-use axum::extract::connect_info::IntoMakeServiceWithConnectInfo;
 use tokio::net::TcpListener;
 
 use super::app::App;
 use super::config::{Config, KeyPolicy};
+use super::connections;
 use super::webhook::{self, WebhookSecret};
 use crate::job::api_key::ApiKeys;
 use crate::job::webhook_outbox::WebhookOutbox;
@@ -47,9 +47,6 @@ pub enum ServiceError {
         /// What the system says.
         error: io::Error,
     },
-    /// The server failed.
-    #[error("the server failed: {0}")]
-    Serve(io::Error),
 }
 
 impl Service {
@@ -92,32 +89,27 @@ impl Service {
     }
 
     /// Answers until `stop` is ready; requests under way then have as long as the configuration gives them.
-    ///
-    /// # Errors
-    /// [`ServiceError::Serve`].
-    pub async fn run(self, stop: impl Future<Output = ()> + Send + 'static) -> Result<(), ServiceError> {
+    pub async fn run(self, stop: impl Future<Output = ()> + Send + 'static) {
         let Self { app, listener, secret, .. } = self;
         let webhooks = tokio::spawn(webhook::run(app.clone(), secret));
         let ending = app.ending.clone();
-        let routes: IntoMakeServiceWithConnectInfo<_, SocketAddr> =
-            super::router(app.clone()).into_make_service_with_connect_info();
         let stopping = ending.clone();
-        let server = axum::serve(listener, routes).with_graceful_shutdown(async move {
+        tokio::spawn(async move {
             stop.await;
             tracing::info!("the server ends");
             stopping.cancel();
         });
-        let patience = Duration::from_secs(app.config.server.shutdown_seconds);
-        let outcome = tokio::select! {
-            outcome = server.into_future() => outcome.map_err(ServiceError::Serve),
+        let server = &app.config.server;
+        let patience = Duration::from_secs(server.shutdown_seconds);
+        let for_heads = Duration::from_secs(server.header_seconds.max(1));
+        tokio::select! {
+            () = connections::serve(listener, super::router(app.clone()), for_heads, ending.clone()) => {}
             // Who still reads then is cut off.
-            () = async { ending.cancelled().await; tokio::time::sleep(patience).await } => Ok(()),
-        };
-        ending.cancel();
+            () = async { ending.cancelled().await; tokio::time::sleep(patience).await } => {}
+        }
         // A delivery under way is tried again after the next start.
         let _ = tokio::time::timeout(Duration::from_secs(1), webhooks).await;
         app.jobs.close().await;
         app.database.close().await;
-        outcome
     }
 }

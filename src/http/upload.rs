@@ -16,7 +16,7 @@ use super::problem::{Kind, Problem};
 use super::wire::scan::Name;
 use crate::formats::MeshFormat;
 use crate::job::blobs::Kept;
-use crate::job::scan::{MeshKind, Part};
+use crate::job::scan::{MeshKind, NewScan, Part};
 
 /// Bytes of a file's beginning that tell what it is.
 const BEGINNING: u64 = 4096;
@@ -25,41 +25,23 @@ const NAME_BYTES: usize = 4096;
 /// For bytes that say of themselves what they are.
 const ANY: &str = "application/octet-stream";
 
-/// Files that were sent, by what they are for.
-pub struct Upload {
-    /// What people call it.
-    pub name: Option<String>,
-    /// What the mesh's bytes are.
-    pub kind: MeshKind,
-    /// The mesh.
-    pub mesh: Kept,
-    /// The landmarks.
-    pub landmarks: Option<Kept>,
-    /// The mask.
-    pub mask: Option<Kept>,
-    /// The texture.
-    pub texture: Option<Kept>,
-}
-
-impl Upload {
-    /// Stores a request's body: one file, or a form with one field for each of `parts`.
-    ///
-    /// # Errors
-    /// A [`Problem`]; nothing is kept then.
-    pub async fn receive(app: &App, request: Request, parts: &[Part]) -> Result<Self, Problem> {
-        check_room(app)?;
-        match media_type(request.headers()).as_deref() {
-            Some("multipart/form-data") => receive_form(app, request, parts).await,
-            Some(ANY) => {
-                let mesh = receive_body(app, request.into_body()).await?;
-                let kind = sniff(app, &mesh, None).await?.ok_or_else(|| unknown_content("body"))?;
-                Ok(Self { name: None, kind, mesh, landmarks: None, mask: None, texture: None })
-            }
-            found => {
-                let kind = found.and_then(kind_of).ok_or_else(|| unknown_mesh(found))?;
-                let mesh = receive_body(app, request.into_body()).await?;
-                Ok(Self { name: None, kind, mesh, landmarks: None, mask: None, texture: None })
-            }
+/// Stores a mesh and what belongs to it: a body that is one file, or a form with one field for each of `parts`.
+///
+/// # Errors
+/// A [`Problem`]; nothing is kept then.
+pub async fn receive(app: &App, request: Request, parts: &[Part]) -> Result<NewScan, Problem> {
+    check_room(app)?;
+    let alone = |kind, mesh| NewScan { name: None, kind, mesh, landmarks: None, mask: None, texture: None };
+    match media_type(request.headers()).as_deref() {
+        Some("multipart/form-data") => receive_form(app, request, parts).await,
+        Some(ANY) => {
+            let mesh = receive_body(app, request.into_body()).await?;
+            let kind = sniff(app, &mesh, None).await?.ok_or_else(|| unknown_content("body"))?;
+            Ok(alone(kind, mesh))
+        }
+        found => {
+            let kind = found.and_then(kind_of).ok_or_else(|| unknown_mesh(found))?;
+            Ok(alone(kind, receive_body(app, request.into_body()).await?))
         }
     }
 }
@@ -69,27 +51,44 @@ impl Upload {
 /// # Errors
 /// A [`Problem`]; nothing is kept then.
 pub async fn receive_body(app: &App, body: Body) -> Result<Kept, Problem> {
-    check_room(app)?;
-    store(app, "body", pieces(app, body)).await
+    receive_file(app, body, app.config.limits.scan.upload_bytes).await
 }
 
-/// Stores a file that comes as a field or as the body.
-async fn store<E: Display>(
+/// Stores a body that is one file of at most `limit` bytes.
+///
+/// # Errors
+/// A [`Problem`]; nothing is kept then.
+pub async fn receive_file(app: &App, body: Body, limit: u64) -> Result<Kept, Problem> {
+    check_room(app)?;
+    store(app, "body", pieces(app, body), limit).await
+}
+
+/// A form's request, whose pieces have to come in time.
+pub fn form_body(app: &App, request: Request) -> Request {
+    let (head, body) = request.into_parts();
+    let body = Body::from_stream(pieces(app, body).map_err(std::io::Error::other));
+    Request::from_parts(head, body)
+}
+
+/// Stores a file of at most `limit` bytes that comes as a field or as the body.
+///
+/// # Errors
+/// A [`Problem`]; nothing is kept then.
+pub async fn store<E: Display>(
     app: &App,
     field: &str,
     pieces: impl Stream<Item = Result<Bytes, E>>,
+    limit: u64,
 ) -> Result<Kept, Problem> {
-    let kept = app.blobs.put(pieces, app.config.limits.scan.upload_bytes).await?;
+    let kept = app.blobs.put(pieces, limit).await?;
     if kept.info.size == 0 {
         return Err(Problem::of_field(Kind::UnreadableFile, field, "is empty", "send the file's bytes"));
     }
     Ok(kept)
 }
 
-async fn receive_form(app: &App, request: Request, parts: &[Part]) -> Result<Upload, Problem> {
-    let (head, body) = request.into_parts();
-    let body = Body::from_stream(pieces(app, body).map_err(std::io::Error::other));
-    let form = Multipart::from_request(Request::from_parts(head, body), app).await;
+async fn receive_form(app: &App, request: Request, parts: &[Part]) -> Result<NewScan, Problem> {
+    let form = Multipart::from_request(form_body(app, request), app).await;
     let mut form = form.map_err(|error| malformed(error.body_text()))?;
     let (mut name, mut kind, mut files) = (None, None, BTreeMap::new());
     while let Some(field) = form.next_field().await.map_err(|error| malformed(error.body_text()))? {
@@ -104,7 +103,7 @@ async fn receive_form(app: &App, request: Request, parts: &[Part]) -> Result<Upl
             return Err(Problem::of_field(Kind::InvalidField, called, "is no field of this form", &remedy));
         };
         let said = (field.content_type().map(str::to_ascii_lowercase), field.file_name().map(str::to_owned));
-        let kept = store(app, part.name(), field).await?;
+        let kept = store(app, part.name(), field, app.config.limits.scan.upload_bytes).await?;
         if *part == Part::Mesh {
             kind = said.0.as_deref().and_then(kind_of);
             if kind.is_none() {
@@ -126,7 +125,7 @@ async fn receive_form(app: &App, request: Request, parts: &[Part]) -> Result<Upl
     let kind = kind.ok_or_else(|| unknown_content("mesh"))?;
     let mut file = |part: Part| files.remove(part.name());
     let (landmarks, mask, texture) = (file(Part::Landmarks), file(Part::Mask), file(Part::Texture));
-    Ok(Upload { name, kind, mesh, landmarks, mask, texture })
+    Ok(NewScan { name, kind, mesh, landmarks, mask, texture })
 }
 
 /// A body's pieces, as long as each comes in time.

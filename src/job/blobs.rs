@@ -30,9 +30,17 @@ pub struct Blobs {
     pins: Arc<Pins>,
 }
 
-/// How often each blob is held by someone who is about to keep a record of it.
+/// Who holds which blob.
 #[derive(Debug, Default)]
-struct Pins(Mutex<HashMap<Sha256, usize>>);
+struct Pins(Mutex<Held>);
+
+#[derive(Debug, Default)]
+struct Held {
+    /// How often each blob is held by someone who is about to keep a record of it.
+    counts: HashMap<Sha256, usize>,
+    /// Blobs that were let go of since this was last asked.
+    released: Vec<Sha256>,
+}
 
 /// Which bytes, and how many.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -186,7 +194,7 @@ impl Blobs {
     /// # Errors
     /// [`StoreError::Blobs`].
     pub async fn remove_unpinned(&self, digest: Sha256) -> Result<bool, StoreError> {
-        if self.pins.lock().contains_key(&digest) {
+        if self.pins.lock().counts.contains_key(&digest) {
             return Ok(false);
         }
         match self.store.delete(&key(digest)).await {
@@ -195,8 +203,13 @@ impl Blobs {
         }
     }
 
+    /// The blobs that nobody holds any more, since this was last asked. Those that no record names were put in vain.
+    pub fn take_released(&self) -> Vec<Sha256> {
+        std::mem::take(&mut self.pins.lock().released)
+    }
+
     fn pin(&self, digest: Sha256, size: u64) -> Kept {
-        *self.pins.lock().entry(digest).or_insert(0) += 1;
+        *self.pins.lock().counts.entry(digest).or_insert(0) += 1;
         Kept { info: BlobInfo { digest, size }, pins: self.pins.clone() }
     }
 }
@@ -235,18 +248,20 @@ fn missing(digest: Sha256, error: object_store::Error) -> StoreError {
 }
 
 impl Pins {
-    fn lock(&self) -> std::sync::MutexGuard<'_, HashMap<Sha256, usize>> {
+    fn lock(&self) -> std::sync::MutexGuard<'_, Held> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
 impl Drop for Kept {
     fn drop(&mut self) {
-        let mut pins = self.pins.lock();
-        if let Some(count) = pins.get_mut(&self.info.digest) {
+        let digest = self.info.digest;
+        let Held { counts, released } = &mut *self.pins.lock();
+        if let Some(count) = counts.get_mut(&digest) {
             *count -= 1;
             if *count == 0 {
-                pins.remove(&self.info.digest);
+                counts.remove(&digest);
+                released.push(digest);
             }
         }
     }

@@ -34,7 +34,9 @@ impl Compute {
     ) -> Result<T, Panicked> {
         let (send, receive) = oneshot::channel();
         let pool = self.pool.read().unwrap_or_else(PoisonError::into_inner).clone();
+        let span = tracing::Span::current();
         pool.spawn(move || {
+            let _within = span.entered();
             let result = catch_unwind(AssertUnwindSafe(work)).map_err(|panic| Panicked(message(&*panic)));
             // Nobody may wait for it any more.
             let _ = send.send(result);
@@ -63,7 +65,7 @@ fn message(panic: &(dyn std::any::Any + Send)) -> String {
 /// Why a step is to stop.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Stop {
-    /// Its registration was canceled or deleted.
+    /// Its job was canceled or deleted.
     Canceled = 1,
     /// It has taken too long.
     TooSlow = 2,
@@ -74,8 +76,8 @@ pub(super) enum Stop {
 /// A step that runs, as both sides see it.
 #[derive(Debug, Default)]
 pub(super) struct Control {
-    /// Its registration.
-    pub registration: i64,
+    /// Its job.
+    pub job: i64,
     /// No other runs beside it.
     pub alone: bool,
     stop: AtomicU8,
@@ -83,8 +85,8 @@ pub(super) struct Control {
 }
 
 impl Control {
-    pub fn new(registration: i64, alone: bool) -> Self {
-        Self { registration, alone, ..Self::default() }
+    pub fn new(job: i64, alone: bool) -> Self {
+        Self { job, alone, ..Self::default() }
     }
 
     /// Asks it to stop; the first reason counts.

@@ -5,8 +5,9 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use sqlx::{Row, Sqlite, Transaction};
+use sqlx::{Sqlite, Transaction};
 use tokio::sync::{Notify, broadcast, watch};
+use tracing::{Instrument, info_span};
 
 use super::blobs::{Blobs, Kept};
 use super::cache::Cache;
@@ -17,16 +18,19 @@ use super::event::{Event, EventKind};
 use super::graph::{self, Changed, Claim, Done};
 use super::inputs::Inputs;
 use super::record::{Fractions, add_event};
-use super::registration::Problem;
 use super::settings::JobSettings;
+use super::state::Problem;
 use super::store_error::StoreError;
-use super::work::{Fault, Produced};
+use super::work::{Decided, Fault, Produced};
 use super::{queue, sweep};
+use crate::render::Adapter;
 
 /// How often a running step is looked after: whether it is to stop, how far it is.
 const LOOK: Duration = Duration::from_millis(200);
 /// How often its progress is told.
 const TELL: Duration = Duration::from_secs(1);
+/// Residuals that are kept until somebody asks for them.
+const RESIDUALS: usize = 10_000;
 /// How long a step that is to stop may take to do so.
 const GRACE: Duration = Duration::from_secs(60);
 
@@ -43,14 +47,20 @@ pub(super) struct Engine {
     feeds: Mutex<HashMap<i64, broadcast::Sender<Event>>>,
     /// Told when steps become ready.
     pub wake: Notify,
+    /// What draws, once it was opened.
+    pub renderer: tokio::sync::Mutex<Option<Adapter>>,
+    /// Held by whoever unpacks a capture to look at it.
+    pub unpacking: tokio::sync::Mutex<()>,
     /// Why no work begins, if none does.
     pub paused: watch::Sender<Option<String>>,
-    /// Counts the registrations that ended.
+    /// Counts the jobs that ended.
     pub finished: watch::Sender<u64>,
     /// Whether the program ends.
     pub closing: watch::Sender<bool>,
     /// Seconds and number of the steps done, by stage.
     pub spent: Mutex<BTreeMap<&'static str, (u64, f64)>>,
+    /// Residuals of the latest results that nobody has asked for yet.
+    pub residuals: Mutex<Vec<f64>>,
     /// Workers that go from step to step.
     pub busy: AtomicUsize,
 }
@@ -61,6 +71,17 @@ enum Outcome {
     Failed(Problem),
     Stopped,
     Store(StoreError),
+}
+
+impl Outcome {
+    fn name(&self) -> &'static str {
+        match self {
+            Self::Done(_) => "done",
+            Self::Failed(_) => "failed",
+            Self::Stopped => "stopped",
+            Self::Store(_) => "store failed",
+        }
+    }
 }
 
 pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
@@ -86,10 +107,13 @@ impl Engine {
             running: Mutex::default(),
             feeds: Mutex::default(),
             wake: Notify::new(),
+            renderer: tokio::sync::Mutex::default(),
+            unpacking: tokio::sync::Mutex::default(),
             paused: watch::Sender::new(None),
             finished: watch::Sender::new(0),
             closing: watch::Sender::new(false),
             spent: Mutex::default(),
+            residuals: Mutex::default(),
             busy: AtomicUsize::new(0),
         })
     }
@@ -113,14 +137,21 @@ impl Engine {
             return Ok(false);
         }
         let Some(claim) = graph::claim(&mut tx, &mut changed, others_run).await? else { return Ok(false) };
-        let control = Arc::new(Control::new(claim.registration, claim.alone));
+        let control = Arc::new(Control::new(claim.job, claim.alone));
         lock(&self.running).insert(claim.step, control.clone());
         let guard = Running { engine: self, step: claim.step };
         tx.commit().await?;
         self.publish(changed);
-        let start = Instant::now();
-        let outcome = self.run(&claim, control).await;
-        let ended = self.end(&claim, outcome, start.elapsed().as_secs_f64()).await;
+        let stage = claim.stage().name();
+        let span = info_span!("step", job = claim.id, stage, place = claim.place, run = claim.run);
+        let work = async {
+            let start = Instant::now();
+            let outcome = self.run(&claim, control).await;
+            let seconds = start.elapsed().as_secs_f64();
+            tracing::debug!(seconds, outcome = outcome.name(), "step ended");
+            self.end(&claim, outcome, seconds).await
+        };
+        let ended = work.instrument(span).await;
         drop(guard);
         ended.map(|()| true)
     }
@@ -146,7 +177,7 @@ impl Engine {
             if start.elapsed() > self.settings.step_time {
                 control.stop(Stop::TooSlow);
             }
-            if self.is_over(claim.registration).await {
+            if self.is_over(claim.job).await {
                 control.stop(Stop::Canceled);
             }
             if start.elapsed() > self.settings.step_time + GRACE {
@@ -172,12 +203,11 @@ impl Engine {
         })
     }
 
-    /// Whether a registration has ended, by somebody else's hand.
-    async fn is_over(&self, registration: i64) -> bool {
-        let query = sqlx::query_scalar::<_, i64>(
-            "SELECT 1 FROM registration WHERE sequence = ? AND status = 'running'",
-        );
-        let found = query.bind(registration).fetch_optional(self.database.reader()).await;
+    /// Whether a job has ended, by somebody else's hand.
+    async fn is_over(&self, job: i64) -> bool {
+        let query =
+            sqlx::query_scalar::<_, i64>("SELECT 1 FROM job WHERE sequence = ? AND status = 'running'");
+        let found = query.bind(job).fetch_optional(self.database.reader()).await;
         matches!(found, Ok(None))
     }
 
@@ -185,20 +215,16 @@ impl Engine {
     async fn tell(&self, claim: &Claim, stage_progress: f64) {
         let told = async {
             let mut connection = self.database.reader().acquire().await?;
-            let query = "SELECT c.scan, r.id FROM child c JOIN registration r ON r.sequence = c.registration
-                WHERE c.registration = ? AND c.place = ?";
-            let row = sqlx::query(query).bind(claim.registration).bind(claim.place);
-            let Some(row) = row.fetch_optional(&mut *connection).await? else { return Ok(()) };
-            let parse = |column| row.try_get::<String, _>(column);
-            let scan = parse("scan")?.parse().map_err(super::record::broken)?;
-            let id = parse("id")?.parse().map_err(super::record::broken)?;
-            let whole = super::record::whole(&mut connection, &id, &self.fractions()).await?;
+            let scan = sqlx::query_scalar::<_, String>("SELECT scan FROM child WHERE job = ? AND place = ?");
+            let scan = scan.bind(claim.job).bind(claim.place).fetch_optional(&mut *connection).await?;
+            let scan = scan.map(|scan| scan.parse()).transpose().map_err(super::record::broken)?;
+            let fractions = self.fractions();
+            let progress = super::record::progress_of(&mut connection, claim.job, &fractions).await?;
             drop(connection);
-            let progress = whole.map_or(0.0, |whole| whole.progress);
             let stage = claim.stage().name().to_owned();
             let mut tx = self.database.begin_write().await?;
             let event = EventKind::Progress { progress, scan, stage, stage_progress };
-            let event = add_event(&mut tx, claim.registration, event).await?;
+            let event = add_event(&mut tx, claim.job, event).await?;
             tx.commit().await?;
             self.publish(Changed { events: vec![event], ..Changed::default() });
             Ok::<(), StoreError>(())
@@ -212,12 +238,7 @@ impl Engine {
         match outcome {
             Outcome::Done(produced) => self.keep(claim, produced, seconds).await,
             Outcome::Failed(problem) => {
-                tracing::warn!(
-                    step = claim.stage().name(),
-                    code = problem.code,
-                    detail = problem.detail,
-                    "step failed"
-                );
+                tracing::warn!(code = problem.code, detail = problem.detail, "step failed");
                 let mut changed = Changed::default();
                 let mut tx = self.database.begin_write().await?;
                 graph::fail(&mut tx, claim, &problem, seconds, &mut changed).await?;
@@ -249,6 +270,10 @@ impl Engine {
             records.push((file, kept.info.digest, kept.info.size));
             held.push(kept);
         }
+        let residual = match &decided {
+            Decided::Judgement(judgement) => judgement.residual,
+            _ => None,
+        };
         let mut changed = Changed::default();
         let mut tx = self.database.begin_write().await?;
         let done = Done { output: output_digest, files: records, decided, seconds };
@@ -257,14 +282,18 @@ impl Engine {
             let mut spent = lock(&self.spent);
             let (count, sum) = spent.entry(claim.stage().name()).or_default();
             (*count, *sum) = (*count + 1, *sum + seconds);
+            drop(spent);
+            let mut residuals = lock(&self.residuals);
+            let room = residuals.len() < RESIDUALS;
+            residuals.extend(residual.filter(|_| room));
         }
-        graph::end_if_too_long(&mut tx, claim.registration, self.settings.job_time, &mut changed).await?;
+        graph::end_if_too_long(&mut tx, claim.job, self.settings.job_time, &mut changed).await?;
         self.commit(tx, changed).await?;
         let digests = held.iter().map(|kept| kept.info.digest).collect();
         drop(held);
         if !own {
-            // The registration ended meanwhile: nobody will name these.
-            sweep::collect(self, digests).await?;
+            // The job ended meanwhile: nobody will name these.
+            sweep::collect(&self.database, &self.blobs, digests).await?;
         }
         Ok(())
     }
@@ -285,7 +314,7 @@ impl Engine {
                 return Err(error);
             }
         };
-        tracing::error!(%error, step = claim.stage().name(), again, "a step's inputs are damaged");
+        tracing::error!(%error, again, "a step's inputs are damaged");
         if !again {
             let problem = Problem { code: "storage".to_owned(), detail: error.to_string() };
             graph::fail(&mut tx, claim, &problem, 0.0, &mut changed).await?;
@@ -302,29 +331,27 @@ impl Engine {
         let dropped = changed.dropped.clone();
         self.cache.forget(&dropped);
         self.publish(changed);
-        if let Err(error) = sweep::collect(self, dropped).await {
-            tracing::warn!(%error, "what is no longer needed cannot be deleted now");
-        }
+        sweep::collect_soon(&self.database, &self.blobs, dropped).await;
         Ok(())
     }
 
     /// Tells of a change that is committed.
     fn publish(&self, changed: Changed) {
         let mut feeds = lock(&self.feeds);
-        for (registration, event) in changed.events {
+        for (job, event) in changed.events {
             let last = event.kind.is_last();
-            if let Some(feed) = feeds.get(&registration) {
+            if let Some(feed) = feeds.get(&job) {
                 // Nobody may listen any more.
                 let _ = feed.send(event);
             }
             if last {
-                feeds.remove(&registration);
+                feeds.remove(&job);
             }
         }
         feeds.retain(|_, feed| feed.receiver_count() > 0);
         drop(feeds);
-        for registration in &changed.ended {
-            self.stop(*registration);
+        for job in &changed.ended {
+            self.stop(*job);
         }
         if !changed.ended.is_empty() {
             self.finished.send_modify(|count| *count += changed.ended.len() as u64);
@@ -341,20 +368,17 @@ impl Engine {
         self.paused.send_replace(Some(reason));
     }
 
-    /// The events of a registration from now on.
-    pub fn subscribe(&self, registration: i64) -> broadcast::Receiver<Event> {
+    /// The events of a job from now on.
+    pub fn subscribe(&self, job: i64) -> broadcast::Receiver<Event> {
         const BUFFERED: usize = 64;
         let mut feeds = lock(&self.feeds);
-        feeds.entry(registration).or_insert_with(|| broadcast::channel(BUFFERED).0).subscribe()
+        feeds.entry(job).or_insert_with(|| broadcast::channel(BUFFERED).0).subscribe()
     }
 
-    /// Asks the steps of a registration to stop.
-    fn stop(&self, registration: i64) {
+    /// Asks the steps of a job to stop.
+    fn stop(&self, job: i64) {
         let running = lock(&self.running);
-        running
-            .values()
-            .filter(|own| own.registration == registration)
-            .for_each(|own| own.stop(Stop::Canceled));
+        running.values().filter(|own| own.job == job).for_each(|own| own.stop(Stop::Canceled));
     }
 
     /// Asks all steps to stop, because the program ends.

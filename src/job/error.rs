@@ -1,6 +1,7 @@
+use super::capture::CaptureFault;
 use super::store_error::StoreError;
 
-/// Why something cannot be done with registrations.
+/// Why something cannot be done with jobs.
 #[derive(Debug, thiserror::Error)]
 pub enum JobError {
     /// What was asked for is wrong in itself.
@@ -11,9 +12,15 @@ pub enum JobError {
         /// What was found and what to do.
         problem: String,
     },
-    /// There is no such registration, or file of it.
+    /// There is no such job, or file of it.
     #[error("there is no {0}")]
     NotFound(String),
+    /// The pictures or cameras of a capture are wrong.
+    #[error("capture: {0}")]
+    Capture(#[from] CaptureFault),
+    /// Nothing can draw.
+    #[error("{0}")]
+    NoAdapter(String),
     /// Not in this state.
     #[error("{0}")]
     Conflict(String),

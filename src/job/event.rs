@@ -1,13 +1,13 @@
 use serde::{Deserialize, Serialize};
 
-use super::registration::{Problem, Status};
 use super::scan::ScanId;
+use super::state::{Problem, Status};
 use crate::pipeline::Verdict;
 
-/// Something that happened to a registration; kept in the database as long as the registration is.
+/// Something that happened to a job; kept in the database as long as the job is.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Event {
-    /// Counts a registration's events from 1.
+    /// Counts a job's events from 1.
     pub sequence: u64,
     /// Milliseconds since 1970.
     pub at: i64,
@@ -20,7 +20,7 @@ pub struct Event {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "event", rename_all = "snake_case")]
 pub enum EventKind {
-    /// The registration's status changed; a final one is the last event.
+    /// The job's status changed; a final one is the last event.
     Status {
         /// The new one.
         status: Status,
@@ -32,10 +32,11 @@ pub enum EventKind {
     },
     /// Work moved on.
     Progress {
-        /// Share of the registration's work done, 0 to 1.
+        /// Share of the job's work done, 0 to 1.
         progress: f64,
-        /// The scan that moved.
-        scan: ScanId,
+        /// The scan that moved, where it was one.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        scan: Option<ScanId>,
         /// What is done to it.
         stage: String,
         /// Share of that stage done on it, 0 to 1.

@@ -12,10 +12,10 @@ use super::record::events;
 /// Events that are read at once.
 const PAGE: i64 = 256;
 
-/// The events of one registration, those of the past first.
+/// The events of one job, those of the past first.
 pub struct EventFeed {
     engine: Arc<Engine>,
-    registration: i64,
+    job: i64,
     /// The number of the last that was given.
     last: u64,
     waiting: VecDeque<Event>,
@@ -26,10 +26,10 @@ pub struct EventFeed {
 }
 
 impl EventFeed {
-    pub(super) fn new(engine: Arc<Engine>, registration: i64, after: u64) -> Self {
+    pub(super) fn new(engine: Arc<Engine>, job: i64, after: u64) -> Self {
         // Before the past is read, so that nothing falls between.
-        let live = engine.subscribe(registration);
-        Self { engine, registration, last: after, waiting: VecDeque::new(), live, behind: true, ended: false }
+        let live = engine.subscribe(job);
+        Self { engine, job, last: after, waiting: VecDeque::new(), live, behind: true, ended: false }
     }
 
     /// The next one; `None` after the last that will ever come.
@@ -52,7 +52,7 @@ impl EventFeed {
                 match self.live.recv().await {
                     Ok(event) => self.waiting.push_back(event),
                     Err(RecvError::Lagged(_)) => self.behind = true,
-                    // The registration has ended or is gone: what was missed is in the database.
+                    // The job has ended or is gone: what was missed is in the database.
                     Err(RecvError::Closed) => {
                         self.read().await?;
                         self.ended = self.waiting.is_empty();
@@ -64,11 +64,11 @@ impl EventFeed {
 
     async fn read(&mut self) -> Result<(), JobError> {
         let reader = self.engine.database.reader();
-        let page = events(reader, self.registration, self.last, PAGE).await?;
+        let page = events(reader, self.job, self.last, PAGE).await?;
         self.behind = page.len() as i64 == PAGE;
         // After its end nothing comes, also to those who have seen the end.
-        let query = "SELECT 1 FROM registration WHERE sequence = ? AND status IN ('queued', 'running')";
-        let query = sqlx::query_scalar::<_, i64>(query).bind(self.registration);
+        let query = "SELECT 1 FROM job WHERE sequence = ? AND status IN ('queued', 'running')";
+        let query = sqlx::query_scalar::<_, i64>(query).bind(self.job);
         if page.is_empty() && query.fetch_optional(reader).await?.is_none() {
             self.ended = true;
         }

@@ -7,13 +7,15 @@ use std::sync::Arc;
 use sqlx::Row;
 
 use super::cache::Cache;
+use super::capture::{CaptureFiles, CaptureParts};
 use super::engine::Engine;
 use super::graph::Claim;
+use super::invert_work::InvertWork;
 use super::record::{ALL, broken, from_json};
-use super::registration::Problem;
 use super::scan::{ScanId, ScanLimits, ScanParts};
 use super::source::{self, For, Source};
 use super::stage::JobStage;
+use super::state::Problem;
 use super::store_error::StoreError;
 use super::template::{TemplateFiles, TemplateParts};
 use super::work::{Fault, PackageWork, PlanFile, PlanWork, SetWork, Work};
@@ -59,6 +61,7 @@ pub(super) enum Inputs {
         failed: Vec<FailedScan>,
         seconds: BTreeMap<String, f64>,
     },
+    Invert(InvertWork),
 }
 
 /// A plan that is still there from the step before, or its bytes.
@@ -74,7 +77,7 @@ struct Reader<'a> {
     claim: &'a Claim,
 }
 
-/// A scan of a registration.
+/// A scan of a job.
 struct Member {
     scan: ScanId,
     name: String,
@@ -127,6 +130,7 @@ impl Inputs {
                 failed: reader.failed().await?,
                 seconds: reader.seconds().await?,
             }),
+            JobStage::Invert => reader.invert().await,
         }
     }
 
@@ -154,6 +158,7 @@ impl Inputs {
             Self::Set { plan, scans, shared, failed, seconds } => {
                 Work::Set(SetWork { plan: plan.read(cache)?, scans, shared, failed, seconds })
             }
+            Self::Invert(work) => Work::Invert(work),
         })
     }
 }
@@ -171,8 +176,8 @@ impl PlanBytes {
 
 impl Reader<'_> {
     async fn member(&self) -> Result<Member, StoreError> {
-        let query = sqlx::query("SELECT scan, name, parts FROM child WHERE registration = ? AND place = ?");
-        let query = query.bind(self.claim.registration).bind(self.claim.place);
+        let query = sqlx::query("SELECT scan, name, parts FROM child WHERE job = ? AND place = ?");
+        let query = query.bind(self.claim.job).bind(self.claim.place);
         let row = query.fetch_one(self.engine.database.reader()).await?;
         Ok(Member {
             scan: row.try_get::<&str, _>("scan")?.parse().map_err(broken)?,
@@ -189,10 +194,10 @@ impl Reader<'_> {
 
     async fn plan_inputs(&self) -> Result<Inputs, StoreError> {
         let Engine { blobs, settings: own, folder, database, .. } = self.engine;
-        let query = sqlx::query("SELECT template_parts, settings FROM registration WHERE sequence = ?");
-        let row = query.bind(self.claim.registration).fetch_one(database.reader()).await?;
+        let query = sqlx::query("SELECT parts, settings FROM job WHERE sequence = ?");
+        let row = query.bind(self.claim.job).fetch_one(database.reader()).await?;
         let parts: Option<TemplateParts> =
-            row.try_get::<Option<&str>, _>("template_parts")?.map(from_json).transpose()?;
+            row.try_get::<Option<&str>, _>("parts")?.map(from_json).transpose()?;
         let template = match parts {
             Some(parts) => Some(TemplateFiles::fetch(blobs, &parts).await?),
             None => None,
@@ -204,6 +209,20 @@ impl Reader<'_> {
             limits: own.scan_limits,
             scratch: folder.uploads(),
         })
+    }
+
+    async fn invert(&self) -> Result<Inputs, StoreError> {
+        let Engine { blobs, settings: own, folder, database, .. } = self.engine;
+        let query = sqlx::query("SELECT parts, settings FROM job WHERE sequence = ?");
+        let row = query.bind(self.claim.job).fetch_one(database.reader()).await?;
+        let parts: CaptureParts = from_json(row.try_get("parts")?)?;
+        Ok(Inputs::Invert(InvertWork {
+            files: CaptureFiles::find(blobs, &parts).await?,
+            settings: from_json(row.try_get("settings")?)?,
+            limits: own.capture_limits,
+            scratch: folder.uploads(),
+            adapter: own.adapter.clone(),
+        }))
     }
 
     async fn plan(&self) -> Result<PlanBytes, StoreError> {
@@ -240,9 +259,9 @@ impl Reader<'_> {
     }
 
     async fn output(&self, number: i64, place: i64) -> Result<Option<Sha256>, StoreError> {
-        let query = "SELECT output FROM step WHERE registration = ? AND stage = ? AND place = ? AND output IS NOT NULL";
         let query =
-            sqlx::query_scalar::<_, String>(query).bind(self.claim.registration).bind(number).bind(place);
+            "SELECT output FROM step WHERE job = ? AND stage = ? AND place = ? AND output IS NOT NULL";
+        let query = sqlx::query_scalar::<_, String>(query).bind(self.claim.job).bind(number).bind(place);
         let digest = query.fetch_optional(self.engine.database.reader()).await?;
         digest.map(|digest| digest.parse().map_err(broken)).transpose()
     }
@@ -250,9 +269,9 @@ impl Reader<'_> {
     /// What a stage left of every scan that has not failed, in the order of their places.
     async fn scans(&self, number: i64) -> Result<Vec<(i64, String, Vec<u8>)>, StoreError> {
         let query = "SELECT s.place, c.name, s.output FROM step s
-            JOIN child c ON c.registration = s.registration AND c.place = s.place
-            WHERE s.registration = ? AND s.stage = ? AND s.output IS NOT NULL AND c.status != 'failed' ORDER BY s.place";
-        let rows = sqlx::query(query).bind(self.claim.registration).bind(number);
+            JOIN child c ON c.job = s.job AND c.place = s.place
+            WHERE s.job = ? AND s.stage = ? AND s.output IS NOT NULL AND c.status != 'failed' ORDER BY s.place";
+        let rows = sqlx::query(query).bind(self.claim.job).bind(number);
         let mut scans = Vec::new();
         for row in rows.fetch_all(self.engine.database.reader()).await? {
             let digest = row.try_get::<&str, _>("output")?.parse().map_err(broken)?;
@@ -263,10 +282,8 @@ impl Reader<'_> {
     }
 
     async fn failed(&self) -> Result<Vec<FailedScan>, StoreError> {
-        let query =
-            "SELECT name, problem FROM child WHERE registration = ? AND status = 'failed' ORDER BY name";
-        let rows =
-            sqlx::query(query).bind(self.claim.registration).fetch_all(self.engine.database.reader()).await?;
+        let query = "SELECT name, problem FROM child WHERE job = ? AND status = 'failed' ORDER BY name";
+        let rows = sqlx::query(query).bind(self.claim.job).fetch_all(self.engine.database.reader()).await?;
         let failed = rows.iter().map(|row| {
             let problem: Option<Problem> =
                 row.try_get::<Option<&str>, _>("problem")?.map(from_json).transpose()?;
@@ -278,9 +295,9 @@ impl Reader<'_> {
 
     /// Seconds of work in each stage.
     async fn seconds(&self) -> Result<BTreeMap<String, f64>, StoreError> {
-        let query = "SELECT stage, sum(coalesce(seconds, 0.0)) AS seconds FROM step WHERE registration = ? GROUP BY stage";
-        let rows =
-            sqlx::query(query).bind(self.claim.registration).fetch_all(self.engine.database.reader()).await?;
+        let query =
+            "SELECT stage, sum(coalesce(seconds, 0.0)) AS seconds FROM step WHERE job = ? GROUP BY stage";
+        let rows = sqlx::query(query).bind(self.claim.job).fetch_all(self.engine.database.reader()).await?;
         let mut seconds = BTreeMap::new();
         for row in rows {
             if let Some(stage) = self.claim.stages.get(row.try_get::<i64, _>("stage")? as usize) {

@@ -1,4 +1,4 @@
-//! The handle through which registrations are asked for and watched.
+//! The handle through which jobs are asked for and watched.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -9,56 +9,59 @@ use tokio::sync::watch;
 use tokio::task::JoinSet;
 
 use super::blobs::{BlobInfo, Blobs};
-use super::clock::now;
 use super::data_folder::DataFolder;
 use super::database::Database;
 use super::engine::{Engine, lock};
 use super::error::JobError;
-use super::event::EventKind;
 use super::feed::EventFeed;
 use super::graph::{self, Changed};
-use super::record::{self, add_event, broken, json, priority_number, status_of};
-use super::registration::{
-    NewMember, NewRegistration, Registration, RegistrationId, ResultFile, Status, TemplateChoice,
-};
-use super::scan::{MeshKind, Scans};
+use super::job_id::{JobId, JobKind, OfKind};
+use super::record::{self, broken, kind_of, status_of};
+use super::registration::{Registering, RegistrationId};
+use super::result_file::ResultFile;
+use super::scan::Scans;
 use super::settings::JobSettings;
-use super::stage::JobStage;
+use super::state::{Job, Status};
 use super::store_error::StoreError;
-use super::submission::{self, Member};
-use super::template::{TemplateError, TemplateParts, Templates};
+use super::template::Templates;
 use super::{queue, supervisor, sweep};
 
 /// How long steps may take to stop when the program ends; what has not stopped is begun anew at the next start.
 const CLOSING: Duration = Duration::from_secs(5);
 
-/// Registrations: asked for, watched, stopped; cheap to clone.
+/// Jobs: asked for, watched, stopped; cheap to clone.
 #[derive(Clone)]
 pub struct Jobs {
-    engine: Arc<Engine>,
-    scans: Scans,
-    templates: Templates,
+    pub(super) engine: Arc<Engine>,
+    pub(super) scans: Scans,
+    pub(super) templates: Templates,
     work: Arc<tokio::sync::Mutex<JoinSet<()>>>,
 }
 
-/// Which registrations to list, the latest first.
-#[derive(Debug, Clone, Default)]
-pub struct Page {
+/// Which jobs to list, the latest first.
+#[derive(Debug, Clone)]
+pub struct Page<K> {
     /// At most so many.
     pub limit: usize,
     /// Only those before this one.
-    pub before: Option<RegistrationId>,
+    pub before: Option<JobId<K>>,
     /// Only those of this status.
     pub status: Option<Status>,
     /// Only those of this owner.
     pub owner: Option<String>,
 }
 
+impl<K> Default for Page<K> {
+    fn default() -> Self {
+        Self { limit: 0, before: None, status: None, owner: None }
+    }
+}
+
 /// How much there is to do, for metrics.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct QueueFigures {
-    /// Registrations by status.
-    pub registrations: Vec<(Status, u64)>,
+    /// How many jobs there are of a kind in a status.
+    pub jobs: Vec<(JobKind, Status, u64)>,
     /// Steps that could run now.
     pub steps_ready: u64,
     /// Steps that run.
@@ -101,95 +104,11 @@ impl Jobs {
         work.abort_all();
     }
 
-    /// Takes a registration on: it is kept before this returns.
-    ///
-    /// # Errors
-    /// [`JobError::Invalid`] names the field; [`JobError::TooMany`] if the owner has too many open;
-    /// [`JobError::Unavailable`] while nothing can be kept.
-    pub async fn submit(&self, new: NewRegistration) -> Result<Registration, JobError> {
-        if let Some(reason) = self.engine.paused.borrow().clone() {
-            return Err(JobError::Unavailable(reason));
-        }
-        if let Some(key) = &new.dedupe_key
-            && let Some(known) = self.by_dedupe_key(key).await?
-        {
-            return Ok(known);
-        }
-        let Engine { blobs, settings: own, folder, .. } = &*self.engine;
-        let members = submission::members(&self.scans, &new.scans, own).await?;
-        let template = self.template_parts(&new.template).await?;
-        let scratch = folder.uploads();
-        let settings =
-            submission::settings(blobs, &new, template.as_ref(), own.scan_limits, &scratch).await?;
-        let id = RegistrationId::new();
-        let mut changed = Changed::default();
-        let mut tx = self.engine.database.begin_write().await?;
-        self.check_room(&mut tx, new.owner.as_deref()).await?;
-        // Its turn comes with those who have had the least work of its priority.
-        let turn = "SELECT coalesce(min(turn), 0.0) FROM registration WHERE status IN ('queued', 'running') AND priority = ?";
-        let priority = priority_number(new.priority);
-        let turn: f64 = sqlx::query_scalar(turn).bind(priority).fetch_one(&mut *tx).await?;
-        let insert =
-            "INSERT INTO registration (id, record, name, owner, dedupe_key, status, priority, template,
-                template_parts, settings, webhook, stages, turn, keep, created_at)
-            VALUES (?, ?, ?, ?, ?, 'queued', ?, ?, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT (dedupe_key) DO NOTHING
-            RETURNING sequence";
-        let sequence = sqlx::query_scalar::<_, i64>(insert)
-            .bind(id.as_str())
-            .bind(record::RECORD)
-            .bind(&new.name)
-            .bind(&new.owner)
-            .bind(&new.dedupe_key)
-            .bind(priority)
-            .bind(json(&new.template))
-            .bind(template.as_ref().map(json))
-            .bind(json(&settings))
-            .bind(&new.webhook)
-            .bind(json(&JobStage::FIRST))
-            .bind(turn)
-            .bind(own.keep.map(|keep| i64::try_from(keep.as_millis()).unwrap_or(i64::MAX / 4)))
-            .bind(now())
-            .fetch_optional(&mut *tx)
-            .await?;
-        let Some(sequence) = sequence else {
-            tx.rollback().await?;
-            let known = self.by_dedupe_key(new.dedupe_key.as_deref().unwrap_or_default()).await?;
-            return known.ok_or_else(|| JobError::NotFound("registration".to_owned()));
-        };
-        for (place, member) in (0..).zip(&members) {
-            insert_member(&mut tx, sequence, place, member).await?;
-        }
-        check_still_there(&mut tx, sequence, members.len()).await?;
-        changed.ready = members.len();
-        let event = EventKind::Status { status: Status::Queued };
-        changed.events.push(add_event(&mut tx, sequence, event).await?);
-        self.engine.commit(tx, changed).await?;
-        self.get(&id).await
-    }
-
-    /// A registration of further scans, against the template that a finished one left: the results of that stay as
-    /// they are.
-    ///
-    /// # Errors
-    /// As [`submit`](Self::submit); [`JobError::Conflict`] while the earlier one has no template.
-    pub async fn add_scans(
-        &self,
-        to: &RegistrationId,
-        scans: Vec<NewMember>,
-        owner: Option<String>,
-    ) -> Result<Registration, JobError> {
-        let earlier = self.get(to).await?;
-        let template = TemplateChoice::Of(to.clone());
-        let (name, priority) = (earlier.name, earlier.priority);
-        self.submit(NewRegistration { name, priority, scans, template, owner, ..NewRegistration::default() })
-            .await
-    }
-
     /// How it stands.
     ///
     /// # Errors
     /// [`JobError::NotFound`].
-    pub async fn get(&self, id: &RegistrationId) -> Result<Registration, JobError> {
+    pub async fn get<K: OfKind>(&self, id: &JobId<K>) -> Result<Job<K>, JobError> {
         // One transaction, so that what is said of its scans goes with what is said of it.
         let mut tx = self.engine.database.reader().begin().await?;
         let found = record::whole(&mut tx, id, &self.engine.fractions()).await?;
@@ -200,33 +119,33 @@ impl Jobs {
     ///
     /// # Errors
     /// [`JobError::Store`].
-    pub async fn list(&self, page: Page) -> Result<Vec<Registration>, JobError> {
+    pub async fn list<K: OfKind>(&self, page: Page<K>) -> Result<Vec<Job<K>>, JobError> {
         let reader = self.engine.database.reader();
         let before = match &page.before {
             // Ids sort by time: where that one was deleted meanwhile, those before its time follow.
             Some(id) => {
-                let query = "SELECT COALESCE((SELECT sequence FROM registration WHERE id = ?1),
-                    (SELECT MAX(sequence) + 1 FROM registration WHERE id < ?1), 0)";
+                let query = "SELECT COALESCE((SELECT sequence FROM job WHERE id = ?1),
+                    (SELECT MAX(sequence) + 1 FROM job WHERE id < ?1), 0)";
                 sqlx::query_scalar(query).bind(id.as_str()).fetch_one(reader).await?
             }
             None => i64::MAX,
         };
-        let query = "SELECT * FROM registration WHERE sequence < ?1 AND (?2 IS NULL OR status = ?2)
-            AND (?3 IS NULL OR owner = ?3) ORDER BY sequence DESC LIMIT ?4";
+        let query = "SELECT * FROM job WHERE sequence < ?1 AND (?2 IS NULL OR status = ?2)
+            AND (?3 IS NULL OR owner = ?3) AND kind = ?4 ORDER BY sequence DESC LIMIT ?5";
         let query = sqlx::query(query).bind(before).bind(page.status.map(Status::name)).bind(&page.owner);
-        let rows = query.bind(page.limit as i64).fetch_all(reader).await?;
-        Ok(rows.iter().map(|row| Ok(record::registration(row)?.1)).collect::<Result<_, StoreError>>()?)
+        let rows = query.bind(K::KIND.name()).bind(page.limit as i64).fetch_all(reader).await?;
+        Ok(rows.iter().map(|row| Ok(record::job(row)?.1)).collect::<Result<_, StoreError>>()?)
     }
 
     /// Stops it: it ends at once, and the work on it within a second. One that has ended stays as it is.
     ///
     /// # Errors
     /// [`JobError::NotFound`].
-    pub async fn cancel(&self, id: &RegistrationId) -> Result<Registration, JobError> {
+    pub async fn cancel<K: OfKind>(&self, id: &JobId<K>) -> Result<Job<K>, JobError> {
         let mut changed = Changed::default();
         let sequence = self.sequence(id).await?;
         let mut tx = self.engine.database.begin_write().await?;
-        let open = "SELECT 1 FROM registration WHERE sequence = ? AND status IN ('queued', 'running')";
+        let open = "SELECT 1 FROM job WHERE sequence = ? AND status IN ('queued', 'running')";
         if sqlx::query_scalar::<_, i64>(open).bind(sequence).fetch_optional(&mut *tx).await?.is_some() {
             graph::end(&mut tx, sequence, Status::Canceled, None, &mut changed).await?;
         }
@@ -238,7 +157,7 @@ impl Jobs {
     ///
     /// # Errors
     /// [`JobError::NotFound`].
-    pub async fn delete(&self, id: &RegistrationId) -> Result<(), JobError> {
+    pub async fn delete<K: OfKind>(&self, id: &JobId<K>) -> Result<(), JobError> {
         Ok(sweep::delete(&self.engine, self.sequence(id).await?).await?)
     }
 
@@ -246,7 +165,7 @@ impl Jobs {
     ///
     /// # Errors
     /// [`JobError::NotFound`].
-    pub async fn events_after(&self, id: &RegistrationId, sequence: u64) -> Result<EventFeed, JobError> {
+    pub async fn events_after<K: OfKind>(&self, id: &JobId<K>, sequence: u64) -> Result<EventFeed, JobError> {
         Ok(EventFeed::new(self.engine.clone(), self.sequence(id).await?, sequence))
     }
 
@@ -254,20 +173,17 @@ impl Jobs {
     ///
     /// # Errors
     /// [`JobError::NotFound`] for what will not be there; [`JobError::Conflict`] for what is not there yet.
-    pub async fn result(&self, id: &RegistrationId, file: &ResultFile) -> Result<BlobInfo, JobError> {
-        let query = "SELECT r.status, f.digest, f.size FROM registration r
-            LEFT JOIN result f ON f.registration = r.sequence AND f.file = ? WHERE r.id = ?";
-        let row = sqlx::query(query).bind(file.path()).bind(id.as_str());
+    pub async fn result<K: OfKind>(&self, id: &JobId<K>, file: &ResultFile) -> Result<BlobInfo, JobError> {
+        let query = "SELECT r.status, f.digest, f.size FROM job r
+            LEFT JOIN result f ON f.job = r.sequence AND f.file = ? WHERE r.id = ? AND r.kind = ?";
+        let row = sqlx::query(query).bind(file.path()).bind(id.as_str()).bind(K::KIND.name());
         let row = row.fetch_optional(self.engine.database.reader()).await?.ok_or_else(|| no_such(id))?;
         let Some(digest) = row.try_get::<Option<&str>, _>("digest")? else {
             return Err(match status_of(row.try_get("status")?)? {
                 status if status.is_final() => {
-                    JobError::NotFound(format!("{} of registration {id}", file.path()))
+                    JobError::NotFound(format!("{} of {} {id}", file.path(), K::KIND))
                 }
-                _ => JobError::Conflict(format!(
-                    "{} is not there yet: wait for the registration's end",
-                    file.path()
-                )),
+                _ => not_yet::<K>(&file.path()),
             });
         };
         let size: i64 = row.try_get("size")?;
@@ -279,18 +195,15 @@ impl Jobs {
     /// # Errors
     /// [`JobError::NotFound`]; [`JobError::Conflict`] before the end.
     pub async fn set(&self, id: &RegistrationId) -> Result<Vec<(String, BlobInfo)>, JobError> {
-        let registration = self.get(id).await?;
-        if !registration.status.is_final() {
-            return Err(JobError::Conflict(
-                "the set is not there yet: wait for the registration's end".to_owned(),
-            ));
+        let job = self.get(id).await?;
+        if !job.status.is_final() {
+            return Err(not_yet::<Registering>("the set"));
         }
         let mut names: BTreeMap<String, String> = BTreeMap::new();
-        for child in &registration.children {
+        for child in &job.children {
             names.insert(ResultFile::Mesh(child.scan.clone()).path(), format!("{}.glb", child.name));
         }
-        let query =
-            "SELECT f.file, f.digest, f.size FROM result f JOIN registration r ON r.sequence = f.registration
+        let query = "SELECT f.file, f.digest, f.size FROM result f JOIN job r ON r.sequence = f.job
             WHERE r.id = ? ORDER BY f.file";
         let rows = sqlx::query(query).bind(id.as_str()).fetch_all(self.engine.database.reader()).await?;
         if rows.is_empty() {
@@ -313,13 +226,15 @@ impl Jobs {
     /// [`JobError::Store`].
     pub async fn figures(&self) -> Result<QueueFigures, JobError> {
         let reader = self.engine.database.reader();
-        let query = "SELECT status, count(*) FROM registration GROUP BY status";
-        let counts: Vec<(String, i64)> = sqlx::query_as(query).fetch_all(reader).await?;
-        let count = |(name, count): &(String, i64)| Ok((status_of(name)?, count.cast_unsigned()));
+        let query = "SELECT kind, status, count(*) FROM job GROUP BY kind, status";
+        let counts: Vec<(String, String, i64)> = sqlx::query_as(query).fetch_all(reader).await?;
+        let count = |(kind, status, count): &(String, String, i64)| {
+            Ok((kind_of(kind)?, status_of(status)?, count.cast_unsigned()))
+        };
         let query = "SELECT count(*) FROM step WHERE state = 'ready'";
         let ready: i64 = sqlx::query_scalar(query).fetch_one(reader).await?;
         Ok(QueueFigures {
-            registrations: counts.iter().map(count).collect::<Result<_, StoreError>>()?,
+            jobs: counts.iter().map(count).collect::<Result<_, StoreError>>()?,
             steps_ready: ready.cast_unsigned(),
             steps_running: self.engine.running().len() as u64,
             stages: lock(&self.engine.spent).clone(),
@@ -327,7 +242,13 @@ impl Jobs {
         })
     }
 
-    /// Counts registrations that came to an end, for those who tell of it.
+    /// The residuals of results since this was last asked, for metrics: each scan's mean distance from its result, in the
+    /// scan's radius.
+    pub fn take_residuals(&self) -> Vec<f64> {
+        std::mem::take(&mut lock(&self.engine.residuals))
+    }
+
+    /// Counts jobs that came to an end, for those who tell of it.
     pub fn finished(&self) -> watch::Receiver<u64> {
         self.engine.finished.subscribe()
     }
@@ -345,77 +266,17 @@ impl Jobs {
         self.engine.paused.borrow().clone()
     }
 
-    async fn sequence(&self, id: &RegistrationId) -> Result<i64, JobError> {
-        let query = sqlx::query_scalar("SELECT sequence FROM registration WHERE id = ?").bind(id.as_str());
+    async fn sequence<K: OfKind>(&self, id: &JobId<K>) -> Result<i64, JobError> {
+        let query = sqlx::query_scalar("SELECT sequence FROM job WHERE id = ? AND kind = ?");
+        let query = query.bind(id.as_str()).bind(K::KIND.name());
         query.fetch_optional(self.engine.database.reader()).await?.ok_or_else(|| no_such(id))
     }
-
-    async fn by_dedupe_key(&self, key: &str) -> Result<Option<Registration>, JobError> {
-        let query =
-            sqlx::query_scalar::<_, String>("SELECT id FROM registration WHERE dedupe_key = ?").bind(key);
-        match query.fetch_optional(self.engine.database.reader()).await? {
-            Some(id) => Ok(Some(self.get(&id.parse().map_err(broken)?).await?)),
-            None => Ok(None),
-        }
-    }
-
-    async fn template_parts(&self, choice: &TemplateChoice) -> Result<Option<TemplateParts>, JobError> {
-        match choice {
-            TemplateChoice::Default => Ok(None),
-            TemplateChoice::Stored(id) => match self.templates.get(id).await {
-                Ok(stored) => Ok(Some(stored.parts)),
-                Err(TemplateError::Store(error)) => Err(error.into()),
-                Err(error) => Err(JobError::invalid("template", error)),
-            },
-            TemplateChoice::Of(id) => {
-                let frozen = self.result(id, &ResultFile::Template).await?;
-                Ok(Some(TemplateParts { kind: MeshKind::Glb, mesh: frozen.digest, landmarks: None }))
-            }
-        }
-    }
-
-    async fn check_room(&self, tx: &mut sqlx::SqliteConnection, owner: Option<&str>) -> Result<(), JobError> {
-        let open = "SELECT count(*) FROM registration WHERE status IN ('queued', 'running') AND owner IS ?";
-        let open: i64 = sqlx::query_scalar(open).bind(owner).fetch_one(tx).await?;
-        let most = self.engine.settings.jobs_per_owner;
-        if open as usize >= most {
-            return Err(JobError::TooMany(format!(
-                "{open} registrations are open, {most} may be: wait for one to end"
-            )));
-        }
-        Ok(())
-    }
 }
 
-async fn insert_member(
-    tx: &mut sqlx::SqliteConnection,
-    registration: i64,
-    place: i64,
-    member: &Member,
-) -> Result<(), StoreError> {
-    let child =
-        "INSERT INTO child (registration, place, scan, name, parts, status) VALUES (?, ?, ?, ?, ?, 'queued')";
-    let child = sqlx::query(child).bind(registration).bind(place).bind(member.scan.as_str());
-    child.bind(&member.name).bind(json(&member.parts)).execute(&mut *tx).await?;
-    let step = "INSERT INTO step (registration, stage, place, state) VALUES (?, 0, ?, 'ready')";
-    sqlx::query(step).bind(registration).bind(place).execute(tx).await?;
-    Ok(())
+fn no_such<K: OfKind>(id: &JobId<K>) -> JobError {
+    JobError::NotFound(format!("{} {id}", K::KIND))
 }
 
-/// Whether no scan was deleted since it was looked at: from now on its files are kept.
-async fn check_still_there(
-    tx: &mut sqlx::SqliteConnection,
-    registration: i64,
-    members: usize,
-) -> Result<(), JobError> {
-    let there = "SELECT count(*) FROM child c JOIN scan s ON s.id = c.scan WHERE c.registration = ?";
-    let there: i64 = sqlx::query_scalar(there).bind(registration).fetch_one(tx).await?;
-    match there as usize == members {
-        true => Ok(()),
-        false => Err(JobError::invalid("scans", "one was deleted just now: leave it out")),
-    }
-}
-
-fn no_such(id: &RegistrationId) -> JobError {
-    JobError::NotFound(format!("registration {id}"))
+fn not_yet<K: OfKind>(what: &str) -> JobError {
+    JobError::Conflict(format!("{what} is not there yet: wait for the {}'s end", K::KIND))
 }

@@ -2,7 +2,10 @@
 //! HTTP.
 
 pub mod api_key;
+mod archive;
 pub mod blobs;
+/// Pictures with cameras.
+pub mod capture;
 mod clock;
 mod data_folder;
 mod database;
@@ -20,20 +23,31 @@ mod cache;
 mod compute;
 mod engine;
 mod error;
-/// What happens to registrations.
+/// What happens to jobs.
 pub mod event;
 mod feed;
 mod graph;
 mod inputs;
+/// Meshes from pictures, as they are asked for.
+pub mod inverse_rendering;
+mod invert_work;
+mod job_id;
 pub mod jobs;
+mod new_job;
 mod queue;
 mod record;
 /// Registrations as they are asked for and told of.
 pub mod registration;
+/// Files that jobs leave.
+pub mod result_file;
 mod settings;
 mod source;
 mod stage;
+/// How jobs stand.
+pub mod state;
 mod submission;
+mod submit;
+mod submit_inverse;
 mod supervisor;
 mod sweep;
 #[cfg(test)]
@@ -42,5 +56,6 @@ mod work;
 
 pub use error::JobError;
 pub use feed::EventFeed;
+pub use job_id::{BadJobId, JobId, JobKind, OfKind};
 pub use jobs::Jobs;
 pub use settings::JobSettings;

@@ -1,5 +1,5 @@
 //! The job engine: apalis hands tickets to workers. A ticket says that some step is ready; which one it is, is decided
-//! when a worker takes it up, by the graph's own table, so that registrations have their turns, a ticket that comes twice
+//! when a worker takes it up, by the graph's own table, so that jobs have their turns, a ticket that comes twice
 //! or is lost does no harm, and a clock that jumps holds nothing back. apalis keeps the tickets, bounds how many are worked
 //! on, and starts a worker again that fails.
 

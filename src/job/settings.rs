@@ -1,19 +1,21 @@
 use std::time::Duration;
 
+use super::capture::CaptureLimits;
 use super::scan::ScanLimits;
+use crate::render::AdapterChoice;
 
-/// How registrations are worked on, and their limits.
+/// How jobs are worked on, and their limits.
 #[derive(Debug, Clone)]
 pub struct JobSettings {
     /// Threads that compute, and steps that run at the same time.
     pub threads: usize,
-    /// Scans of one registration.
+    /// Scans of one job.
     pub scans: usize,
-    /// Registrations of one owner that have not ended.
+    /// Jobs of one owner that have not ended.
     pub jobs_per_owner: usize,
     /// The longest that a step may take; the scan fails then.
     pub step_time: Duration,
-    /// The most work that a registration may take, over all its steps.
+    /// The most work that a job may take, over all its steps.
     pub job_time: Duration,
     /// A step during which the program ended so often is taken to be the reason.
     pub crashes: u32,
@@ -21,10 +23,14 @@ pub struct JobSettings {
     pub cache_bytes: usize,
     /// Bytes of the disk that stay free: no work begins with less.
     pub keep_free: u64,
-    /// How long a registration and its results are kept after it ends; for ever without.
+    /// How long a job and its results are kept after it ends; for ever without.
     pub keep: Option<Duration>,
     /// How large scans and templates may be.
     pub scan_limits: ScanLimits,
+    /// How large captures may be.
+    pub capture_limits: CaptureLimits,
+    /// What inverse renderings are drawn with.
+    pub adapter: AdapterChoice,
 }
 
 impl Default for JobSettings {
@@ -41,6 +47,8 @@ impl Default for JobSettings {
             keep_free: 1 << 30,
             keep: Some(Duration::from_secs(30 * 24 * 3600)),
             scan_limits: ScanLimits::default(),
+            capture_limits: CaptureLimits::default(),
+            adapter: AdapterChoice::Best,
         }
     }
 }

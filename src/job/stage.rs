@@ -2,7 +2,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::pipeline::{Plan, PlanStage};
 
-/// What is done to the scans of a registration, one by one or together.
+/// What is done in a job: to the scans of a registration one by one or together, or to all pictures of a capture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(super) enum JobStage {
@@ -16,6 +16,8 @@ pub(super) enum JobStage {
     Package,
     /// The files of the whole set.
     Set,
+    /// A mesh from pictures, the whole of it.
+    Invert,
 }
 
 impl JobStage {
@@ -32,7 +34,7 @@ impl JobStage {
     pub fn is_shared(self) -> bool {
         match self {
             Self::Inspect | Self::Package => false,
-            Self::Plan | Self::Set => true,
+            Self::Plan | Self::Set | Self::Invert => true,
             Self::Engine(stage) => stage.is_shared(),
         }
     }
@@ -50,6 +52,7 @@ impl JobStage {
             Self::Engine(PlanStage::Round(_)) => "round",
             Self::Package => "package",
             Self::Set => "set",
+            Self::Invert => "invert",
         }
     }
 }

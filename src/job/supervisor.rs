@@ -55,6 +55,8 @@ fn jump(before: i64, after: i64, passed: Duration) -> Duration {
 }
 
 async fn look(engine: &Engine) -> Result<(), StoreError> {
+    // Uploads that came to nothing, refused or broken off between two files; first, since they may be what fills the disk.
+    sweep::collect_soon(&engine.database, &engine.blobs, engine.blobs.take_released()).await;
     let free = engine.folder.free_bytes()?;
     let keep = engine.settings.keep_free;
     if free < keep {

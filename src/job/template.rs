@@ -16,8 +16,9 @@ use super::database::Database;
 use super::scan::{BadId, MeshKind, ScanFault, ScanFiles, ScanLimits};
 use super::scan::{Part, checked_id, digest_id, kind_of};
 use super::store_error::StoreError;
+use super::sweep::collect_soon;
 use crate::formats::{FormatError, Sha256};
-use crate::pipeline::{FrozenCollection, FrozenError, LEAST_LANDMARKS, Settings, Template};
+use crate::pipeline::{FrozenCollection, FrozenError, LEAST_LANDMARKS, MaskError, Settings, Template};
 
 /// Version of the stored record.
 const RECORD: i64 = 1;
@@ -55,6 +56,8 @@ pub struct TemplateParts {
     pub mesh: Sha256,
     /// Its landmarks; a frozen collection holds its own.
     pub landmarks: Option<Sha256>,
+    /// Its mask, as its landmarks.
+    pub mask: Option<Sha256>,
 }
 
 /// What is in a template.
@@ -83,6 +86,8 @@ pub struct NewTemplate {
     pub mesh: Kept,
     /// Its landmarks.
     pub landmarks: Option<Kept>,
+    /// How much each of its vertices takes of the scans' data.
+    pub mask: Option<Kept>,
 }
 
 /// The bytes of a template's files.
@@ -91,6 +96,7 @@ pub struct TemplateFiles {
     kind: MeshKind,
     mesh: Bytes,
     landmarks: Option<Bytes>,
+    mask: Option<Bytes>,
 }
 
 /// Why a template cannot be kept or found.
@@ -141,18 +147,14 @@ impl Templates {
             Err(TemplateError::NotFound(_)) => {}
             known => return Ok((known?, false)),
         }
-        let parts = TemplateParts {
-            kind: new.kind,
-            mesh: new.mesh.info.digest,
-            landmarks: new.landmarks.as_ref().map(|kept| kept.info.digest),
-        };
+        let parts = parts_of(&new);
         let files = TemplateFiles::fetch(&self.blobs, &parts).await?;
         let (limits, scratch) = (self.limits, self.scratch.clone());
         let work = move || files.read(&limits, &scratch).map(|(template, _)| TemplateFigures::of(&template));
         let figures = tokio::task::spawn_blocking(work).await.map_err(|_| TemplateError::Crashed)??;
         let figures = serde_json::to_string(&figures).unwrap_or_default();
-        let insert = "INSERT INTO template (id, record, name, format, mesh, landmarks, size, figures, created_at) \
-            VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT (id) DO NOTHING";
+        let insert = "INSERT INTO template (id, record, name, format, mesh, landmarks, mask, size, figures, created_at) \
+            VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT (id) DO NOTHING";
         let inserted = sqlx::query(insert)
             .bind(&id.0)
             .bind(RECORD)
@@ -160,6 +162,7 @@ impl Templates {
             .bind(parts.kind.extension())
             .bind(parts.mesh.to_string())
             .bind(parts.landmarks.map(|digest| digest.to_string()))
+            .bind(parts.mask.map(|digest| digest.to_string()))
             .bind(new.mesh.info.size.cast_signed())
             .bind(figures)
             .bind(now())
@@ -196,11 +199,18 @@ impl Templates {
     /// # Errors
     /// [`TemplateError::NotFound`].
     pub async fn delete(&self, id: &TemplateId) -> Result<(), TemplateError> {
-        let query = sqlx::query("DELETE FROM template WHERE id = ?").bind(&id.0);
-        match query.execute(self.database.writer()).await?.rows_affected() {
-            0 => Err(TemplateError::NotFound(id.clone())),
-            _ => Ok(()),
-        }
+        let query = sqlx::query("DELETE FROM template WHERE id = ? RETURNING *").bind(&id.0);
+        let row = query.fetch_optional(self.database.writer()).await?;
+        let row = row.ok_or_else(|| TemplateError::NotFound(id.clone()))?;
+        let parts = StoredTemplate::try_from(row)?.parts;
+        collect_soon(&self.database, &self.blobs, parts.digests().collect()).await;
+        Ok(())
+    }
+}
+
+impl TemplateParts {
+    fn digests(&self) -> impl Iterator<Item = Sha256> {
+        [Some(self.mesh), self.landmarks, self.mask].into_iter().flatten()
     }
 }
 
@@ -210,11 +220,14 @@ impl TemplateFiles {
     /// # Errors
     /// As [`Blobs::read`].
     pub async fn fetch(blobs: &Blobs, parts: &TemplateParts) -> Result<Self, StoreError> {
-        let landmarks = match parts.landmarks {
-            Some(digest) => Some(blobs.read(digest).await?),
-            None => None,
-        };
-        Ok(Self { kind: parts.kind, mesh: blobs.read(parts.mesh).await?, landmarks })
+        let mut others = [None, None];
+        for (other, digest) in others.iter_mut().zip([parts.landmarks, parts.mask]) {
+            if let Some(digest) = digest {
+                *other = Some(blobs.read(digest).await?);
+            }
+        }
+        let [landmarks, mask] = others;
+        Ok(Self { kind: parts.kind, mesh: blobs.read(parts.mesh).await?, landmarks, mask })
     }
 
     /// Reads them, which takes long: not on an async thread. A frozen collection brings its settings. `scratch` is a
@@ -227,15 +240,24 @@ impl TemplateFiles {
         limits: &ScanLimits,
         scratch: &std::path::Path,
     ) -> Result<(Template, Option<Settings>), ScanFault> {
-        let Self { kind, mesh, landmarks } = self;
-        let files = ScanFiles { kind, mesh, landmarks, mask: None, texture: None };
+        let Self { kind, mesh, landmarks, mask } = self;
+        let files = ScanFiles { kind, mesh, landmarks, mask, texture: None };
         // The limits hold for frozen collections too, before their records are looked at.
         let read = files.read(limits, scratch)?;
         match FrozenCollection::parse(&files.mesh).map_err(frozen_fault)? {
+            Some(_) if read.mask.is_some() => {
+                let problem = "goes with no frozen collection, which keeps its own: leave it out";
+                Err(ScanFault::Unfit { part: Part::Mask, problem: problem.to_owned() })
+            }
             Some(FrozenCollection { template, settings }) => Ok((template, Some(settings))),
             None => match &read.landmarks {
                 Some(landmarks) if landmarks.present().count() >= LEAST_LANDMARKS => {
-                    Ok((Template::of_file(&read.file, landmarks), None))
+                    let template = Template::of_file(&read.file, landmarks);
+                    let template = Template { mask: read.mask, ..template };
+                    let unfit =
+                        |error: MaskError| ScanFault::Unfit { part: Part::Mask, problem: error.to_string() };
+                    template.check_mask().map_err(unfit)?;
+                    Ok((template, None))
                 }
                 given => {
                     let found = given.as_ref().map_or(0, |landmarks| landmarks.present().count());
@@ -291,7 +313,10 @@ impl TryFrom<SqliteRow> for StoredTemplate {
         if record != RECORD {
             return Err(broken(format!("it is of version {record}")));
         }
-        let landmarks = row.try_get::<Option<&str>, _>("landmarks")?;
+        let digest = |column| {
+            let text: Option<&str> = row.try_get(column)?;
+            text.map(|text| text.parse().map_err(broken)).transpose()
+        };
         Ok(Self {
             id: TemplateId(row.try_get("id")?),
             sequence: row.try_get("sequence")?,
@@ -299,7 +324,8 @@ impl TryFrom<SqliteRow> for StoredTemplate {
             parts: TemplateParts {
                 kind: kind_of(row.try_get("format")?)?,
                 mesh: row.try_get::<&str, _>("mesh")?.parse().map_err(broken)?,
-                landmarks: landmarks.map(str::parse).transpose().map_err(broken)?,
+                landmarks: digest("landmarks")?,
+                mask: digest("mask")?,
             },
             size: u64::try_from(row.try_get::<i64, _>("size")?).map_err(broken)?,
             figures: serde_json::from_str(row.try_get("figures")?).map_err(broken)?,
@@ -308,12 +334,22 @@ impl TryFrom<SqliteRow> for StoredTemplate {
     }
 }
 
+fn parts_of(new: &NewTemplate) -> TemplateParts {
+    let digest = |kept: &Option<Kept>| kept.as_ref().map(|kept| kept.info.digest);
+    let (landmarks, mask) = (digest(&new.landmarks), digest(&new.mask));
+    TemplateParts { kind: new.kind, mesh: new.mesh.info.digest, landmarks, mask }
+}
+
 fn id_of(new: &NewTemplate) -> TemplateId {
     let mut hasher = sha2::Sha256::new();
-    let landmarks = new.landmarks.as_ref().map(|kept| kept.info.digest.to_string());
+    let digest = |kept: &Kept| kept.info.digest.to_string();
+    let landmarks = new.landmarks.as_ref().map(digest);
     let name = new.name.as_ref().map(|name| format!("={name}"));
     let parts = [landmarks, name].map(Option::unwrap_or_default);
     hasher.update(format!("template {}\n{}\n{}\n{}", new.kind, new.mesh.info.digest, parts[0], parts[1]));
+    if let Some(mask) = &new.mask {
+        hasher.update(format!("\nmask {}", digest(mask)));
+    }
     TemplateId(digest_id(hasher.into()))
 }
 

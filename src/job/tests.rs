@@ -8,10 +8,10 @@ use serde_json::{Value, json};
 use super::blobs::Blobs;
 use super::event::EventKind;
 use super::jobs::{Jobs, Page};
-use super::registration::{
-    NewMember, NewRegistration, Priority, Registration, ResultFile, Status, TemplateChoice,
-};
+use super::registration::{NewMember, NewRegistration, Registering, Registration, TemplateChoice};
+use super::result_file::ResultFile;
 use super::scan::{MeshKind, NewScan, ScanId, ScanLimits, Scans};
+use super::state::{Priority, Status};
 use super::template::Templates;
 use super::{DataFolder, Database, JobError, JobSettings};
 use crate::demo::{SculptedHead, Sculptor, Settings as Sculpture};
@@ -199,8 +199,8 @@ async fn a_registration_gives_what_the_command_line_gives() {
     // Intermediate results are gone, and every step ran once.
     assert_eq!(service.count("SELECT count(*) FROM step WHERE output IS NOT NULL").await, 0);
     assert_eq!(service.count("SELECT max(runs) FROM step").await, 1);
-    let named = service
-        .count("SELECT count(*) FROM (SELECT * FROM uploaded_blob UNION SELECT * FROM registered_blob)");
+    let named =
+        service.count("SELECT count(*) FROM (SELECT * FROM uploaded_blob UNION SELECT * FROM job_blob)");
     let named = named.await;
     let kept: Vec<_> = futures_util::StreamExt::collect(service.blobs.list()).await;
     assert_eq!(kept.len() as i64, named);
@@ -338,7 +338,7 @@ async fn a_small_registration_is_not_starved_by_a_large_one_and_priority_goes_fi
     assert_eq!(service.ended(&large).await.status, Status::Succeeded);
     assert_ne!(service.jobs.get(&low.id).await.unwrap().status, Status::Succeeded);
     assert_eq!(service.ended(&low).await.status, Status::Succeeded);
-    let latest = service.jobs.list(Page { limit: 2, ..Page::default() }).await.unwrap();
+    let latest = service.jobs.list(Page::<Registering> { limit: 2, ..Page::default() }).await.unwrap();
     assert_eq!(latest.iter().map(|one| &one.id).collect::<Vec<_>>(), [&low.id, &small.id]);
     let before = Page { limit: 9, before: Some(small.id.clone()), ..Page::default() };
     assert_eq!(service.jobs.list(before).await.unwrap().len(), 1);
@@ -380,10 +380,12 @@ async fn later_scans_are_registered_to_what_is_frozen() {
     let heads = heads(3);
     let members = service.upload_all(&heads).await;
     let first = service.jobs.submit(asked(members[..2].to_vec())).await.unwrap();
-    let early = service.jobs.add_scans(&first.id, members[2..].to_vec(), None).await;
+    let early = service.jobs.add_scans(&first.id, members[2..].to_vec(), None, None).await;
     assert!(matches!(early, Err(JobError::Conflict(_))), "{early:?}");
     let first = service.ended(&first).await;
-    let later = service.jobs.add_scans(&first.id, members[2..].to_vec(), None).await.unwrap();
+    let add = || service.jobs.add_scans(&first.id, members[2..].to_vec(), None, Some("key".into()));
+    let later = add().await.unwrap();
+    assert_eq!(add().await.unwrap().id, later.id, "asked for again with the same key it is the same");
     assert_eq!(later.template, TemplateChoice::Of(first.id.clone()));
     let later = service.ended(&later).await;
     assert_eq!((later.status, &later.settings), (Status::Succeeded, &first.settings));

@@ -1,4 +1,4 @@
-//! What is still to be told of ended registrations, and when it is tried again.
+//! What is still to be told of ended jobs, and when it is tried again.
 
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
@@ -6,9 +6,12 @@ use sqlx::Row;
 
 use super::clock::now;
 use super::database::Database;
-use super::registration::RegistrationId;
+use super::job_id::JobKind;
+use super::record::kind_of;
 use super::store_error::StoreError;
 
+/// Milliseconds that a delivery is put off at most.
+pub const LONGEST_PAUSE: i64 = 12 * 60 * 60 * 1000;
 /// What secrets begin with.
 const PREFIX: &str = "whsec_";
 
@@ -18,7 +21,9 @@ pub struct Delivery {
     /// The message's id, the same at every try.
     pub message: String,
     /// What it is about.
-    pub registration: RegistrationId,
+    pub job: String,
+    /// What that is.
+    pub kind: JobKind,
     /// Where to.
     pub url: String,
     /// Tries that failed.
@@ -37,15 +42,15 @@ impl WebhookOutbox {
         Self { database }
     }
 
-    /// Takes on a delivery for every registration that has ended and is to be told of, each once.
+    /// Takes on a delivery for every job that has ended and is to be told of, each once.
     ///
     /// # Errors
     /// [`StoreError::Database`].
     pub async fn collect(&self) -> Result<(), StoreError> {
-        let insert = "INSERT INTO webhook_delivery (registration, message, url, failed, next_at) \
-            SELECT id, 'msg_' || lower(hex(randomblob(16))), webhook, 0, ?1 FROM registration \
+        let insert = "INSERT INTO webhook_delivery (job, kind, message, url, failed, next_at) \
+            SELECT id, kind, 'msg_' || lower(hex(randomblob(16))), webhook, 0, ?1 FROM job \
             WHERE webhook IS NOT NULL AND finished_at IS NOT NULL \
-            AND id NOT IN (SELECT registration FROM webhook_delivery)";
+            AND id NOT IN (SELECT job FROM webhook_delivery)";
         sqlx::query(insert).bind(now()).execute(self.database.writer()).await?;
         Ok(())
     }
@@ -55,17 +60,20 @@ impl WebhookOutbox {
     /// # Errors
     /// [`StoreError::Database`].
     pub async fn due(&self, limit: u32) -> Result<Vec<Delivery>, StoreError> {
-        let query =
-            "SELECT * FROM webhook_delivery WHERE ended_at IS NULL AND next_at <= ? ORDER BY next_at LIMIT ?";
-        let rows = sqlx::query(query).bind(now()).bind(limit).fetch_all(self.database.reader()).await?;
+        // What is further off than any pause was put off by a clock that has been set back since.
+        let query = "SELECT * FROM webhook_delivery WHERE ended_at IS NULL
+            AND (next_at <= ?1 OR next_at > ?1 + ?2) ORDER BY next_at LIMIT ?3";
+        let rows = sqlx::query(query)
+            .bind(now())
+            .bind(LONGEST_PAUSE)
+            .bind(limit)
+            .fetch_all(self.database.reader())
+            .await?;
         let delivery = |row: sqlx::sqlite::SqliteRow| {
-            let broken = |problem: super::registration::BadRegistrationId| StoreError::Record {
-                what: "a delivery",
-                problem: problem.to_string(),
-            };
             Ok(Delivery {
                 message: row.try_get("message")?,
-                registration: row.try_get::<&str, _>("registration")?.parse().map_err(broken)?,
+                job: row.try_get("job")?,
+                kind: kind_of(row.try_get("kind")?)?,
                 url: row.try_get("url")?,
                 failed: row.try_get("failed")?,
             })
@@ -93,13 +101,13 @@ impl WebhookOutbox {
         Ok(())
     }
 
-    /// Notes that a delivery failed, and in how many milliseconds it is tried again.
+    /// Notes that a delivery failed, and in how many milliseconds it is tried again, at most [`LONGEST_PAUSE`].
     ///
     /// # Errors
     /// [`StoreError::Database`].
     pub async fn postpone(&self, delivery: &Delivery, milliseconds: i64) -> Result<(), StoreError> {
         let update = sqlx::query("UPDATE webhook_delivery SET failed = ?, next_at = ? WHERE message = ?");
-        let update = update.bind(delivery.failed + 1).bind(now().saturating_add(milliseconds));
+        let update = update.bind(delivery.failed + 1).bind(now() + milliseconds.min(LONGEST_PAUSE));
         update.bind(&delivery.message).execute(self.database.writer()).await?;
         Ok(())
     }

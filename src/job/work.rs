@@ -7,15 +7,17 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 use serde_json::value::RawValue;
 
-use super::registration::{Problem, ResultFile};
+use super::invert_work::InvertWork;
+use super::result_file::ResultFile;
 use super::scan::ScanId;
 use super::stage::JobStage;
+use super::state::Problem;
 use crate::formats::Sha256;
 use crate::pipeline::{
     BadState, ComparisonRow, FailedScan, FrozenCollection, InputEntry, Inspected, LandmarkEntry,
     LandmarkWeights, MOST_ROWS, Manifest, Observer, OutputEntry, OutputFormat, Placed, Plan, PlanStage,
-    Precheck, Prepared, RegisterError, Report, ScanEntry, ScanResult, ScanState, Settings, SharedState,
-    Subject, Template, Verdict, comparison_row, comparison_sheet, decode, encode, leave_out,
+    Precheck, Prepared, RegisterError, Report, ScanEntry, ScanReport, ScanResult, ScanState, Settings,
+    SharedState, Subject, Template, Verdict, comparison_row, comparison_sheet, decode, encode, leave_out,
     precheck_inspected, record_bytes,
 };
 use crate::preflight::LandmarkAudit;
@@ -41,6 +43,8 @@ pub(super) enum Work {
     Package(PackageWork),
     /// [`JobStage::Set`].
     Set(SetWork),
+    /// [`JobStage::Invert`].
+    Invert(InvertWork),
 }
 
 /// The scans as they were inspected, by their places.
@@ -81,15 +85,23 @@ pub(super) struct Produced {
     pub decided: Decided,
 }
 
-/// What a step decides for the registration.
+/// What a step decides for its job.
 #[derive(Default)]
 pub(super) enum Decided {
     #[default]
     Nothing,
     /// What is done from now on, and which scans are left out, by their places.
     Course(Vec<JobStage>, Vec<(i64, String)>),
-    /// Whether a scan's result can be used.
-    Verdict(Verdict),
+    /// How good a scan's result is.
+    Judgement(Judgement),
+}
+
+/// How good a scan's result is.
+pub(super) struct Judgement {
+    /// Whether it can be used.
+    pub verdict: Verdict,
+    /// Mean distance of the scan from it, in the scan's radius; none where they do not face each other.
+    pub residual: Option<f64>,
 }
 
 /// Why a step leaves nothing.
@@ -196,6 +208,7 @@ impl Work {
             }
             Self::Package(work) => work.run(),
             Self::Set(work) => work.run(),
+            Self::Invert(work) => work.run(observer),
         }
     }
 }
@@ -280,8 +293,16 @@ impl PackageWork {
         Ok(Produced {
             output: encode(&packaged),
             files: vec![(ResultFile::Mesh(scan), glb)],
-            decided: Decided::Verdict(result.report.verdict),
+            decided: Decided::Judgement(Judgement::of(&result.report, &subject)),
         })
+    }
+}
+
+impl Judgement {
+    fn of(report: &ScanReport, subject: &Subject) -> Self {
+        let radius = subject.mesh.radius_about(subject.mesh.centroid());
+        let distances = report.fidelity.scan_to_mesh.as_ref();
+        Self { verdict: report.verdict, residual: distances.map(|distances| distances.mean / radius) }
     }
 }
 

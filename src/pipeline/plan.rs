@@ -8,7 +8,6 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::landmark_weights::LandmarkWeights;
-use super::mask::check_mask;
 use super::observer::{Observer, Stage};
 use super::register::{RegisterError, Registration, Subject};
 use super::settings::Settings;
@@ -94,8 +93,7 @@ impl Plan {
         if scans == 0 {
             return Err(RegisterError::Empty);
         }
-        let mask = template.mask.as_ref().map_or(Ok(()), |mask| check_mask(mask, template.positions.len()));
-        mask.map_err(RegisterError::TemplateMask)?;
+        template.check_mask().map_err(RegisterError::TemplateMask)?;
         Ok(Self::Template(TemplateCourse::new(template, scans, settings)))
     }
 

@@ -2,6 +2,7 @@ use std::collections::BTreeMap;
 
 use glam::{DVec2, DVec3, Vec3A};
 
+use super::mask::{MaskError, check_mask};
 use super::sphere::Sphere;
 use crate::formats::{MeshFile, Region, Scheme};
 use crate::mesh::{LandmarkSet, SurfacePoint, TriangleId, sphere_layout};
@@ -70,6 +71,14 @@ impl Template {
             mask: None,
             frozen: false,
         }
+    }
+
+    /// Whether its mask, if it has one, is one of its vertices.
+    ///
+    /// # Errors
+    /// [`MaskError`] names what is wrong.
+    pub fn check_mask(&self) -> Result<(), MaskError> {
+        self.mask.as_ref().map_or(Ok(()), |mask| check_mask(mask, self.positions.len()))
     }
 
     /// Where a landmark lies on positions `[N, 3]` of the shared triangles.

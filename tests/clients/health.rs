@@ -3,7 +3,8 @@ use crate::server::Server;
 
 #[test]
 fn a_server_says_whether_it_takes_work() {
-    let server = Server::start();
+    let data = tempfile::tempdir().unwrap();
+    let server = Server::start(data.path());
     let health = || command().args(["health", &server.url]).output().unwrap();
     let output = health();
     assert!(output.status.success() && String::from_utf8_lossy(&output.stdout).ends_with(": ok\n"));

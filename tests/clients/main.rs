@@ -6,5 +6,6 @@ mod demo;
 mod health;
 mod proxy;
 mod quick_start;
+#[path = "../common/server.rs"]
 mod server;
 mod submit;

@@ -15,7 +15,7 @@ fn the_python_script_does_what_it_says() {
     let folder = tempfile::tempdir().unwrap();
     let (scans, out) = (folder.path().join("scans"), folder.path().join("out"));
     let names = write_collection(&scans, 2);
-    let server = Server::start();
+    let server = Server::start(&folder.path().join("data"));
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/quick_start.py");
     let quick = r#"{"vertices": 642, "parameters": {"groupwise.rounds": 1, "groupwise.phases": 2}}"#;
     let run = |server: &str, more: &str| {

@@ -45,10 +45,11 @@ fn results_are_those_of_register() {
     let folder = tempfile::tempdir().unwrap();
     let [scans, own, sent] = ["scans", "own", "sent"].map(|name| folder.path().join(name));
     let names = write_collection(&scans, 2);
-    let registered = command().args(quick_register(&scans, &own)).output().unwrap();
+    let weighed = ["--landmark-weight", "30=5"];
+    let registered = command().args(quick_register(&scans, &own)).args(weighed).output().unwrap();
     assert!(registered.status.success(), "{}", said(&registered));
-    let server = Server::start();
-    let submitted = submit(&server.url, &scans, &sent).output().unwrap();
+    let server = Server::start(&folder.path().join("data"));
+    let submitted = submit(&server.url, &scans, &sent).args(weighed).output().unwrap();
     assert!(submitted.status.success(), "{}", said(&submitted));
     same(&own, &sent, &meshes(&names));
     same(&own, &sent, &["sheet.png".to_owned()]);
@@ -64,7 +65,7 @@ fn results_are_those_of_register() {
     fs::write(sent.join(&first), "spoiled").unwrap();
     fs::remove_file(sent.join("sheet.png")).unwrap();
     fs::write(sent.join(".sheet.png.part"), "of another file").unwrap();
-    let again = submit(&server.url, &scans, &sent).output().unwrap();
+    let again = submit(&server.url, &scans, &sent).args(weighed).output().unwrap();
     assert!(
         again.status.success() && said(&again).contains("found as it was asked for before"),
         "{}",
@@ -105,7 +106,7 @@ fn broken_connections_are_resumed() {
     let folder = tempfile::tempdir().unwrap();
     let [scans, whole, pieces] = ["scans", "whole", "pieces"].map(|name| folder.path().join(name));
     let names = write_collection(&scans, 2);
-    let server = Server::start();
+    let server = Server::start(&folder.path().join("data"));
     // Fewer bytes than any mesh has: without resuming none would ever be whole.
     let proxy = Proxy::before(&server.url, 24 << 10);
     let output = submit(&proxy.url, &scans, &pieces).output().unwrap();
@@ -121,12 +122,14 @@ fn a_server_that_dies_and_comes_back_is_waited_for() {
     let folder = tempfile::tempdir().unwrap();
     let [scans, whole, waited] = ["scans", "whole", "waited"].map(|name| folder.path().join(name));
     let names = write_collection(&scans, 2);
-    let server = Server::start();
+    let server = Server::start(&folder.path().join("data"));
     let mut begun =
         submit(&server.url, &scans, &waited).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
     let mut lines = BufReader::new(begun.stderr.take().unwrap()).lines().map_while(Result::ok);
     assert!(lines.any(|line| line.contains("is asked for")));
-    let server = server.killed_and_started_again();
+    let address = server.url.trim_start_matches("http://").to_owned();
+    server.kill();
+    let server = Server::with(&folder.path().join("data"), &address, &[]);
     let rest: Vec<String> = lines.collect();
     assert!(begun.wait().unwrap().success(), "{rest:?}");
     let output = submit(&server.url, &scans, &whole).output().unwrap();
@@ -144,7 +147,8 @@ fn what_is_wrong_is_said() {
         assert_eq!(output.status.code(), Some(code), "{}", said(&output));
         said(&output)
     };
-    let server = Server::with(&["--set", "server.keys=required"]);
+    let data = folder.path().join("data");
+    let server = Server::with(&data, "127.0.0.1:0", &["--set", "server.keys=required"]);
     let found = complaint(submit(&server.url, &scans, &out), 1);
     assert!(found.contains("An API key is needed") && found.contains("onemesh key create"), "{found}");
     let mut wrong = submit(&server.url, &scans, &out);

@@ -1,6 +1,9 @@
 //! The server is killed in the middle of its work, again and again: what was acknowledged stays, the work goes on from the
 //! steps that were done, and the results are those of a server that nobody disturbed.
 
+#[path = "../common/client.rs"]
+mod client;
+#[path = "../common/server.rs"]
 mod server;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -111,7 +114,8 @@ impl Results {
         let path = format!("/v1/registrations/{}", registration["id"].as_str().unwrap());
         let mut files = BTreeMap::new();
         let mut take = |file: String| {
-            let bytes = server.file(&format!("{path}/{file}"));
+            let (status, bytes) = server.send("GET", &format!("{path}/{file}"), "", &[]).unwrap();
+            assert_eq!(status, 200, "{file}");
             files.insert(file, bytes);
         };
         for child in registration["children"].as_array().unwrap() {
@@ -143,7 +147,7 @@ fn check_store(folder: &Path, kills: usize) {
         let interrupted: i64 = steps.iter().map(|(_, crashes, _)| crashes).sum();
         let threads = std::thread::available_parallelism().unwrap().get();
         assert!(interrupted as usize <= kills * threads, "{interrupted}");
-        let named = "SELECT digest FROM uploaded_blob UNION SELECT digest FROM registered_blob";
+        let named = "SELECT digest FROM uploaded_blob UNION SELECT digest FROM job_blob";
         let named: Vec<String> = sqlx::query_scalar(named).fetch_all(database.reader()).await.unwrap();
         assert_eq!(files(&folder.join("blobs")), named.into_iter().collect());
         assert_eq!(files(&folder.join("uploads")), BTreeSet::new());

@@ -1,4 +1,8 @@
+use std::time::Duration;
+
 use hyper::Request;
+use tokio::io::{AsyncReadExt, AsyncWriteExt};
+use tokio::net::TcpStream;
 
 use crate::server::Server;
 
@@ -43,6 +47,20 @@ async fn a_request_has_an_id() {
     let given = server.send(Request::get("/healthz").header("x-request-id", "mine"), "").await;
     assert_eq!(given.headers["x-request-id"], "mine");
     assert_eq!(server.get("/healthz").await.headers["x-request-id"].len(), 32);
+}
+
+#[tokio::test]
+async fn a_request_that_does_not_come_is_not_waited_for() {
+    let server = Server::with(|config| config.server.header_seconds = 1).await;
+    let mut silent = TcpStream::connect(server.address).await.unwrap();
+    let mut slow = TcpStream::connect(server.address).await.unwrap();
+    slow.write_all(b"GET /healthz HTTP/1.1\r\nHost: x\r\nX-A: ").await.unwrap();
+    for stream in [&mut silent, &mut slow] {
+        let mut rest = Vec::new();
+        let ended = tokio::time::timeout(Duration::from_secs(20), stream.read_to_end(&mut rest));
+        ended.await.expect("the connection ends").unwrap();
+    }
+    assert_eq!(server.get("/healthz").await.status, 200);
 }
 
 #[tokio::test]

@@ -5,6 +5,8 @@ mod capabilities;
 mod contract;
 mod document;
 mod health;
+mod inverse_renderings;
+mod pictures;
 mod registration_events;
 mod registration_results;
 mod registrations;

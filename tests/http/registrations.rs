@@ -76,6 +76,8 @@ async fn scans_are_added_to_what_has_ended() {
         "{added}"
     );
     assert_eq!(added["template"], format!("registration:{}", done["id"].as_str().unwrap()));
+    let metrics = server.get("/metrics").await.text();
+    assert!(metrics.contains("\nonemesh_residual_count 3\n"), "each result's residual: {metrics}");
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -34,6 +34,17 @@ fn uploads(server: &Server) -> usize {
     std::fs::read_dir(server.folder.path().join("data/uploads")).unwrap().count()
 }
 
+/// Waits until nothing is kept.
+async fn emptied(server: &Server) {
+    for _ in 0..100 {
+        if blobs(server) == 0 {
+            return;
+        }
+        tokio::time::sleep(Duration::from_millis(50)).await;
+    }
+    panic!("{} blobs are kept", blobs(server));
+}
+
 #[tokio::test]
 async fn an_uploaded_scan_is_looked_at() {
     let server = Server::start().await;
@@ -119,6 +130,7 @@ async fn bodies_that_are_wrong_are_refused() {
     let claim = "ply\nformat binary_little_endian 1.0\nelement vertex 4000000000\nproperty float x\nproperty float y\nproperty float z\nend_header\n";
     assert_eq!(problem("model/ply", claim).await, (422, "unreadable-file".into()));
     assert_eq!(uploads(&server), 0);
+    emptied(&server).await;
 }
 
 #[tokio::test]
@@ -179,6 +191,7 @@ async fn a_deleted_scan_is_gone() {
     let server = Server::start().await;
     let path = format!("/v1/scans/{}", id(&server.post("/v1/scans", "model/obj", OBJ).await));
     assert_eq!(server.delete(&path).await.status, 204);
+    assert_eq!(blobs(&server), 0, "its files go with it");
     assert_eq!(server.delete(&path).await.problem(), (404, "not-found".into()));
     assert_eq!(server.get(&path).await.problem(), (404, "not-found".into()));
     assert_eq!(server.get("/v1/scans/nonsense").await.problem(), (404, "not-found".into()));

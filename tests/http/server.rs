@@ -62,7 +62,7 @@ impl Server {
         let (stop, stopped) = oneshot::channel();
         let running = tokio::spawn(async move {
             let stopped = async move { drop(stopped.await) };
-            service.run(stopped).await.unwrap();
+            service.run(stopped).await;
         });
         Self { address, folder, stop: Some(stop), running }
     }

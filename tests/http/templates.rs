@@ -35,6 +35,24 @@ async fn a_mesh_with_landmarks_is_a_template() {
 }
 
 #[tokio::test]
+async fn a_mask_comes_with_it() {
+    let server = Server::start().await;
+    let masked = |mask: &str| {
+        let part = format!("--b\r\nContent-Disposition: form-data; name=\"mask\"\r\n\r\n{mask}\r\n");
+        part + &form(Some(LANDMARKS))
+    };
+    let made = server.post("/v1/templates", FORM, masked("[1, 1, 1, 0]")).await;
+    assert_eq!((made.status.as_u16(), &made.json()["masked"]), (201, &true.into()), "{}", made.text());
+    let other = server.post("/v1/templates", FORM, form(Some(LANDMARKS))).await.json();
+    assert!(other["masked"] == false && other["id"] != made.json()["id"], "{other}");
+    for mask in ["[1, 1]", "[0, 0, 0, 0]", "[1, 1, 1, 2]", "nothing"] {
+        let refused = server.post("/v1/templates", FORM, masked(mask)).await;
+        assert_eq!(refused.problem(), (422, "unreadable-file".into()), "{mask}");
+        assert_eq!(refused.json()["field"], "mask");
+    }
+}
+
+#[tokio::test]
 async fn the_built_in_one_is_there_and_stays() {
     let server = Server::start().await;
     assert_eq!(server.get("/v1/templates/default").await.json()["built_in"], true);

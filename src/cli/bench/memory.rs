@@ -8,16 +8,21 @@ pub fn forget_peak() {
 
 /// The largest amount of memory that was held, in MiB; `None` where the system does not say.
 pub fn peak() -> Option<f64> {
-    mebibytes("VmHWM:")
+    mebibytes("self", "VmHWM:")
+}
+
+/// The same of another process.
+pub fn peak_of(process: u32) -> Option<f64> {
+    mebibytes(&process.to_string(), "VmHWM:")
 }
 
 /// The memory that is held now, in MiB; `None` where the system does not say.
 pub fn resident() -> Option<f64> {
-    mebibytes("VmRSS:")
+    mebibytes("self", "VmRSS:")
 }
 
-fn mebibytes(field: &str) -> Option<f64> {
-    let status = fs::read_to_string("/proc/self/status").ok()?;
+fn mebibytes(process: &str, field: &str) -> Option<f64> {
+    let status = fs::read_to_string(format!("/proc/{process}/status")).ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix(field))?;
     let kibibytes: f64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
     Some(kibibytes / 1024.0)

@@ -1,5 +1,6 @@
 //! Medians of repeated runs, as a markdown table.
 
+mod clients;
 mod clock;
 mod inverse;
 mod kernels;
@@ -8,6 +9,7 @@ mod readers;
 mod rendering;
 mod service;
 mod stages;
+mod upload;
 
 use std::path::PathBuf;
 
@@ -36,6 +38,12 @@ pub struct Bench {
     /// Nothing but so many small registrations through the service's jobs, and the memory in between
     #[arg(long, value_name = "N")]
     soak: Option<usize>,
+    /// Nothing but how long answers take while two registrations run and so many clients, 1 to 2000, ask how they stand
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=2000))]
+    clients: Option<u64>,
+    /// Nothing but the memory that a server takes for an upload of so many triangles
+    #[arg(long, value_name = "TRIANGLES", value_parser = clap::value_parser!(u64).range(1000..=10_000_000))]
+    upload: Option<u64>,
     /// Leaves a part out; may be repeated
     #[arg(long, value_enum, value_name = "PART")]
     skip: Vec<Part>,
@@ -74,6 +82,12 @@ impl Bench {
         clock.head();
         if let Some(registrations) = self.soak {
             return service::soak(registrations);
+        }
+        if let Some(count) = self.clients {
+            return clients::clients(count as usize);
+        }
+        if let Some(triangles) = self.upload {
+            return upload::upload(triangles as usize);
         }
         // First, while nothing else has taken memory.
         if self.does(Part::Collection) {

@@ -1,12 +1,15 @@
+use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, ensure};
 use onemesh::demo::SculptedHead;
 use onemesh::formats::{landmarks_json, ply_bytes};
+use onemesh::http::App;
 use onemesh::job::blobs::Blobs;
-use onemesh::job::registration::{NewMember, NewRegistration, Status};
+use onemesh::job::registration::{NewMember, NewRegistration, RegistrationId};
 use onemesh::job::scan::{MeshKind, NewScan, ScanLimits, Scans};
+use onemesh::job::state::Status;
 use onemesh::job::template::Templates;
 use onemesh::job::{DataFolder, Database, JobSettings, Jobs};
 use serde_json::json;
@@ -17,12 +20,12 @@ use super::{memory, sculpt};
 /// Registrations between two looks at the memory.
 const ROUND: usize = 50;
 
-/// The service without its HTTP, in a folder of its own.
-struct Bed {
+/// The service without its HTTP.
+pub struct Bed {
     blobs: Blobs,
     scans: Scans,
-    jobs: Jobs,
-    _folder: tempfile::TempDir,
+    /// What is worked on.
+    pub jobs: Jobs,
 }
 
 /// A sculpted collection through the service's jobs, from the first upload to the end.
@@ -77,7 +80,8 @@ pub fn soak(registrations: usize) -> anyhow::Result<()> {
 fn in_service(work: impl AsyncFnOnce(&Bed) -> anyhow::Result<()>) -> anyhow::Result<()> {
     let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().build()?;
     runtime.block_on(async {
-        let bed = Bed::start().await?;
+        let folder = tempfile::tempdir()?;
+        let bed = Bed::start(folder.path()).await?;
         let outcome = work(&bed).await;
         bed.jobs.close().await;
         outcome
@@ -85,9 +89,13 @@ fn in_service(work: impl AsyncFnOnce(&Bed) -> anyhow::Result<()>) -> anyhow::Res
 }
 
 impl Bed {
-    async fn start() -> anyhow::Result<Self> {
-        let scratch = tempfile::tempdir()?;
-        let folder = Arc::new(DataFolder::open(scratch.path())?);
+    /// That of a server.
+    pub fn of(app: &App) -> Self {
+        Self { blobs: app.blobs.clone(), scans: app.scans.clone(), jobs: app.jobs.clone() }
+    }
+
+    async fn start(folder: &Path) -> anyhow::Result<Self> {
+        let folder = Arc::new(DataFolder::open(folder)?);
         let database = Database::open(&folder.database()).await?;
         let blobs = Blobs::open(folder.path())?;
         let limits = ScanLimits::default();
@@ -96,10 +104,11 @@ impl Bed {
         let settings = JobSettings { keep_free: 0, ..JobSettings::default() };
         let stores = (scans.clone(), templates);
         let jobs = Jobs::start(folder, database, blobs.clone(), stores, settings).await?;
-        Ok(Self { blobs, scans, jobs, _folder: scratch })
+        Ok(Self { blobs, scans, jobs })
     }
 
-    async fn upload(&self, heads: &[SculptedHead]) -> anyhow::Result<Vec<NewMember>> {
+    /// Uploads scans with their landmarks.
+    pub async fn upload(&self, heads: &[SculptedHead]) -> anyhow::Result<Vec<NewMember>> {
         let mut members = Vec::new();
         for head in heads {
             let mesh = self.blobs.put_bytes(ply_bytes(&head.mesh)).await?;
@@ -115,10 +124,16 @@ impl Bed {
     /// Registers, and deletes what came of it.
     async fn register(&self, new: NewRegistration) -> anyhow::Result<()> {
         let id = self.jobs.submit(new).await?.id;
-        let mut events = self.jobs.events_after(&id, 0).await?;
-        while events.next().await?.is_some() {}
-        let ended = self.jobs.get(&id).await?;
-        ensure!(ended.status == Status::Succeeded, "it ended as {}", ended.status.name());
+        self.ended(&id).await?;
         self.jobs.delete(&id).await.context("its results")
+    }
+
+    /// Waits for a registration's end.
+    pub async fn ended(&self, id: &RegistrationId) -> anyhow::Result<()> {
+        let mut events = self.jobs.events_after(id, 0).await?;
+        while events.next().await?.is_some() {}
+        let ended = self.jobs.get(id).await?;
+        ensure!(ended.status == Status::Succeeded, "it ended as {}", ended.status.name());
+        Ok(())
     }
 }

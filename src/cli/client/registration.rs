@@ -31,6 +31,9 @@ pub struct Asked {
     pub vertices: Option<usize>,
     /// Other parameters by their dotted names.
     pub parameters: BTreeMap<String, Value>,
+    /// How much landmarks count in the template's mean, by name.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub landmark_weights: BTreeMap<String, f64>,
 }
 
 /// A scan of what is asked for.

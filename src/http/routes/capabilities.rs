@@ -18,5 +18,6 @@ pub fn router() -> OpenApiRouter<App> {
     responses((status = 200, description = "Formats, limits, parameters.", body = Capabilities)),
 )]
 async fn get(State(app): State<App>) -> Json<Capabilities> {
-    Json((&app.config).into())
+    let renderer = app.jobs.renderer().await;
+    Json(Capabilities::of(&app.config, renderer))
 }

@@ -10,7 +10,7 @@ use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
 use crate::http::app::App;
-use crate::http::metrics::StatusLabels;
+use crate::http::metrics::{JobLabels, StatusLabels};
 use crate::http::problem::{Kind, Problem};
 use crate::http::upload::check_room;
 
@@ -71,15 +71,18 @@ async fn ready(State(app): State<App>) -> Result<Json<Health>, Problem> {
 )]
 async fn metrics(State(app): State<App>) -> Result<([(HeaderName, &'static str); 1], String), Problem> {
     let figures = app.jobs.figures().await?;
-    for (status, count) in figures.registrations {
-        let labels = StatusLabels { status: status.name() };
-        app.metrics.registrations.get_or_create(&labels).set(count.cast_signed());
+    for (kind, status, count) in figures.jobs {
+        let labels = JobLabels { kind: kind.name(), status: status.name() };
+        app.metrics.jobs.get_or_create(&labels).set(count.cast_signed());
     }
     for (status, count) in [("ready", figures.steps_ready), ("running", figures.steps_running)] {
         app.metrics.steps.get_or_create(&StatusLabels { status }).set(count.cast_signed());
     }
     for (stage, (steps, seconds)) in figures.stages {
         app.metrics.set_stage(stage, steps, seconds);
+    }
+    for residual in app.jobs.take_residuals() {
+        app.metrics.residuals.observe(residual);
     }
     app.metrics.free_bytes.set(app.folder.free_bytes()? as f64);
     Ok(([(CONTENT_TYPE, OPEN_METRICS)], app.metrics.text()))

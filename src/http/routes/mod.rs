@@ -2,6 +2,8 @@
 
 mod capabilities;
 mod health;
+mod inverse_rendering_files;
+mod inverse_renderings;
 mod registration_events;
 mod registration_results;
 mod registrations;
@@ -22,6 +24,8 @@ pub fn router() -> OpenApiRouter<App> {
         .merge(registrations::router())
         .merge(registration_events::router())
         .merge(registration_results::router())
+        .merge(inverse_renderings::router())
+        .merge(inverse_rendering_files::router())
         .merge(capabilities::router())
         .merge(health::router())
 }

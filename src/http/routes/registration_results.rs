@@ -9,12 +9,14 @@ use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
 use crate::http::app::App;
-use crate::http::blob_answer::{Asked, BlobAnswer, asked_range, file_headers, is_known, unsatisfiable};
+use crate::http::blob_answer::{Asked, asked_range, file_headers, is_known, unsatisfiable};
 use crate::http::extract::{Id, Ids};
+use crate::http::job_answer::give;
 use crate::http::problem::{Kind, Problem};
 use crate::http::wire::Binary;
 use crate::http::zip_stream::ZipStream;
-use crate::job::registration::{RegistrationId, ResultFile};
+use crate::job::registration::RegistrationId;
+use crate::job::result_file::ResultFile;
 
 pub fn router() -> OpenApiRouter<App> {
     OpenApiRouter::new()
@@ -177,18 +179,4 @@ async fn set(
         _ => Body::from_stream(zip.bytes(app.blobs.clone(), range)),
     };
     Ok((status, headers, body).into_response())
-}
-
-async fn give(
-    app: App,
-    id: RegistrationId,
-    file: ResultFile,
-    media_type: &'static str,
-    file_name: &str,
-    method: &Method,
-    headers: &HeaderMap,
-) -> Result<Response, Problem> {
-    let blob = app.jobs.result(&id, &file).await?;
-    let answer = BlobAnswer { blob, media_type, file_name, immutable: true };
-    answer.respond(&app.blobs, method, headers).await
 }

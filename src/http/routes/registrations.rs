@@ -1,11 +1,8 @@
 //! `/v1/registrations`
 
-use std::time::Duration;
-
 use axum::extract::State;
-use axum::http::header::LOCATION;
-use axum::http::{HeaderMap, HeaderValue, StatusCode};
-use axum::response::{IntoResponse, Response};
+use axum::http::{HeaderMap, StatusCode};
+use axum::response::Response;
 use axum::{Extension, Json};
 use serde::Deserialize;
 use utoipa::IntoParams;
@@ -15,7 +12,7 @@ use utoipa_axum::routes;
 use crate::http::app::App;
 use crate::http::auth::Client;
 use crate::http::extract::{Id, JsonBody, QueryOf};
-use crate::http::idempotency::key_of;
+use crate::http::job_answer::{answer, dedupe_key};
 use crate::http::page::{Page, limit, usual};
 use crate::http::problem::{Kind, Problem};
 use crate::http::upload::check_room;
@@ -23,13 +20,8 @@ use crate::http::webhook::check_address;
 use crate::http::wire::registration::{
     AddedScans, RegistrationRequest, RegistrationSummary, RegistrationView, StatusName,
 };
-use crate::job::JobError;
-use crate::job::event::EventKind;
 use crate::job::jobs::Page as JobPage;
-use crate::job::registration::{Registration, RegistrationId};
-
-/// Seconds that a client may ask to wait.
-const LONGEST_WAIT: u64 = 60;
+use crate::job::registration::RegistrationId;
 
 pub fn router() -> OpenApiRouter<App> {
     OpenApiRouter::new()
@@ -79,10 +71,10 @@ async fn create(
     if let Some(webhook) = &request.webhook {
         check_address(webhook, &app.config.webhooks)?;
     }
-    let dedupe_key = key_of(&headers)?.map(|key| format!("{}/{key}/{digest}", owner(&client)));
+    let dedupe_key = dedupe_key(&client, &headers, &digest)?;
     let new = request.into_new(client.key, dedupe_key)?;
     let registration = app.jobs.submit(new).await?;
-    answer(&app, &headers, registration).await
+    answer::<_, RegistrationView>(&app, &headers, "registrations", registration).await
 }
 
 /// Lists registrations
@@ -169,60 +161,10 @@ async fn add_scans(
     Extension(client): Extension<Client>,
     Id(id): Id<RegistrationId>,
     headers: HeaderMap,
-    JsonBody { value: added, .. }: JsonBody<AddedScans>,
+    JsonBody { value: added, digest }: JsonBody<AddedScans>,
 ) -> Result<Response, Problem> {
     check_room(&app)?;
-    let registration = app.jobs.add_scans(&id, added.into_members()?, client.key).await?;
-    answer(&app, &headers, registration).await
-}
-
-fn owner(client: &Client) -> &str {
-    client.key.as_deref().unwrap_or_default()
-}
-
-/// Tells of a new registration, after waiting for its end as long as the client likes.
-async fn answer(app: &App, headers: &HeaderMap, registration: Registration) -> Result<Response, Problem> {
-    let id = registration.id.clone();
-    let preferred = headers.get_all("prefer").iter().filter_map(|value| value.to_str().ok()).find_map(wait);
-    let registration = match preferred {
-        Some(seconds) => {
-            // The time may be up, or the server about to end: it is then told as it stands.
-            let wait = Duration::from_secs(seconds.min(LONGEST_WAIT));
-            tokio::select! {
-                ended = tokio::time::timeout(wait, ended(app, &id)) => { let _ = ended; }
-                () = app.ending.cancelled() => {}
-            }
-            app.jobs.get(&id).await?
-        }
-        None => registration,
-    };
-    let status = if registration.status.is_final() { StatusCode::OK } else { StatusCode::ACCEPTED };
-    let view = Json(RegistrationView::from(registration));
-    let mut response = (status, [(LOCATION, format!("/v1/registrations/{id}"))], view).into_response();
-    if preferred.is_some() {
-        response.headers_mut().insert("preference-applied", HeaderValue::from_static("wait"));
-    }
-    Ok(response)
-}
-
-async fn ended(app: &App, id: &RegistrationId) -> Result<(), JobError> {
-    let mut events = app.jobs.events_after(id, 0).await?;
-    while let Some(event) = events.next().await? {
-        if EventKind::is_last(&event.kind) {
-            break;
-        }
-    }
-    Ok(())
-}
-
-/// The seconds of `wait=N` in a `Prefer` header.
-fn wait(header: &str) -> Option<u64> {
-    let wishes = header.split([',', ';']).map(str::trim);
-    wishes
-        .filter_map(|wish| wish.split_once('='))
-        .find(|(name, _)| name.trim() == "wait")?
-        .1
-        .trim()
-        .parse()
-        .ok()
+    let dedupe_key = dedupe_key(&client, &headers, &format!("{id}/{digest}"))?;
+    let registration = app.jobs.add_scans(&id, added.into_members()?, client.key, dedupe_key).await?;
+    answer::<_, RegistrationView>(&app, &headers, "registrations", registration).await
 }

@@ -13,7 +13,7 @@ use crate::http::app::App;
 use crate::http::extract::{Id, QueryOf};
 use crate::http::page::{Page, PageQuery};
 use crate::http::problem::Problem;
-use crate::http::upload::Upload;
+use crate::http::upload::receive;
 use crate::http::wire::Binary;
 use crate::http::wire::form::ScanForm;
 use crate::http::wire::scan::{Name, ScanSummary, ScanView};
@@ -56,10 +56,9 @@ async fn create(
     request: Request,
 ) -> Result<(StatusCode, [(HeaderName, String); 1], Json<ScanView>), Problem> {
     let parts = [Part::Mesh, Part::Landmarks, Part::Mask, Part::Texture];
-    let Upload { name, kind, mesh, landmarks, mask, texture } =
-        Upload::receive(&app, request, &parts).await?;
-    let name = name.or(query.name.map(Into::into));
-    let (scan, new) = app.scans.add(NewScan { name, kind, mesh, landmarks, mask, texture }).await?;
+    let sent = receive(&app, request, &parts).await?;
+    let name = sent.name.or(query.name.map(Into::into));
+    let (scan, new) = app.scans.add(NewScan { name, ..sent }).await?;
     let status = if new { StatusCode::CREATED } else { StatusCode::OK };
     Ok((status, [(LOCATION, format!("/v1/scans/{}", scan.id))], Json(scan.try_into()?)))
 }

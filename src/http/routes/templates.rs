@@ -13,12 +13,12 @@ use crate::http::app::App;
 use crate::http::extract::{Id, QueryOf};
 use crate::http::page::{LAST_PLACE, Page, PageQuery};
 use crate::http::problem::{Kind, Problem};
-use crate::http::upload::Upload;
+use crate::http::upload::receive;
 use crate::http::wire::Binary;
 use crate::http::wire::form::TemplateForm;
 use crate::http::wire::scan::Name;
 use crate::http::wire::template::TemplateView;
-use crate::job::scan::Part;
+use crate::job::scan::{NewScan, Part};
 use crate::job::template::{NewTemplate, TemplateId};
 
 pub fn router() -> OpenApiRouter<App> {
@@ -37,7 +37,7 @@ struct TemplateQuery {
 
 /// Uploads a template
 ///
-/// A mesh with its landmarks as a form, or the `template.frozen.glb` of a finished registration as the body. The same files under
+/// A mesh with its landmarks, and perhaps a mask, as a form, or the `template.frozen.glb` of a finished registration as the body. The same files under
 /// the same name again give the same template, with status 200.
 #[utoipa::path(
     post, path = "/v1/templates", operation_id = "create_template", tag = "templates",
@@ -55,10 +55,10 @@ async fn create(
     QueryOf(query): QueryOf<TemplateQuery>,
     request: Request,
 ) -> Result<(StatusCode, [(HeaderName, String); 1], Json<TemplateView>), Problem> {
-    let upload = Upload::receive(&app, request, &[Part::Mesh, Part::Landmarks]).await?;
-    let name = upload.name.or(query.name.map(Into::into));
-    let Upload { kind, mesh, landmarks, .. } = upload;
-    let (template, new) = app.templates.add(NewTemplate { name, kind, mesh, landmarks }).await?;
+    let NewScan { name, kind, mesh, landmarks, mask, .. } =
+        receive(&app, request, &[Part::Mesh, Part::Landmarks, Part::Mask]).await?;
+    let name = name.or(query.name.map(Into::into));
+    let (template, new) = app.templates.add(NewTemplate { name, kind, mesh, landmarks, mask }).await?;
     let status = if new { StatusCode::CREATED } else { StatusCode::OK };
     Ok((status, [(LOCATION, format!("/v1/templates/{}", template.id))], Json(template.into())))
 }

@@ -1,26 +1,28 @@
 use std::time::Duration;
 
 use futures_util::StreamExt;
-use serde_json::json;
+use serde::Serialize;
+use serde_json::{Value, json};
 
 use super::address::check_address;
 use super::request::post;
 use super::signature::WebhookSecret;
 use crate::http::app::App;
+use crate::http::wire::inverse_rendering::InverseRenderingSummary;
 use crate::http::wire::registration::RegistrationSummary;
 use crate::http::wire::rfc3339;
-use crate::job::JobError;
-use crate::job::StoreError;
-use crate::job::webhook_outbox::{Delivery, WebhookOutbox};
+use crate::job::inverse_rendering::Inverting;
+use crate::job::registration::Registering;
+use crate::job::state::Job;
+use crate::job::webhook_outbox::{Delivery, LONGEST_PAUSE, WebhookOutbox};
+use crate::job::{BadJobId, JobError, JobId, JobKind, OfKind, StoreError};
 
 /// Deliveries that are tried at the same time.
 const AT_ONCE: usize = 8;
 /// Those that are taken up together.
 const BATCH: u32 = 64;
-/// Seconds before the second try; each pause after it is three times as long.
-const FIRST_PAUSE: i64 = 5;
-/// Seconds of the longest pause.
-const LONGEST_PAUSE: i64 = 12 * 60 * 60;
+/// Milliseconds before the second try; each pause after it is three times as long.
+const FIRST_PAUSE: i64 = 5000;
 /// How long to wait when nothing says that there is something to do.
 const IDLE: Duration = Duration::from_secs(60);
 
@@ -66,7 +68,7 @@ async fn attempt(
     secret: &WebhookSecret,
     delivery: Delivery,
 ) -> Result<(), StoreError> {
-    let (config, registration) = (&app.config.webhooks, &delivery.registration);
+    let (config, job) = (&app.config.webhooks, &delivery.job);
     let patience = Duration::from_secs(config.timeout_seconds.max(1));
     let outcome = match tokio::time::timeout(patience, deliver(app, secret, &delivery)).await {
         Ok(outcome) => outcome,
@@ -74,35 +76,47 @@ async fn attempt(
     };
     match outcome {
         Ok(()) => {
-            tracing::info!(%registration, "webhook delivered");
+            tracing::info!(job, "webhook delivered");
             outbox.end(&delivery).await
         }
         Err(error) if delivery.failed + 1 >= config.attempts => {
-            tracing::warn!(%registration, error, "webhook given up");
+            tracing::warn!(job, error, "webhook given up");
             outbox.end(&delivery).await
         }
         Err(error) => {
             let pause = FIRST_PAUSE.saturating_mul(3_i64.saturating_pow(delivery.failed)).min(LONGEST_PAUSE);
-            tracing::info!(%registration, error, pause, "webhook will be tried again");
-            outbox.postpone(&delivery, 1000 * pause).await
+            tracing::info!(job, error, pause, "webhook will be tried again");
+            outbox.postpone(&delivery, pause).await
         }
     }
+}
+
+/// What is told of the end of a job.
+async fn body(app: &App, delivery: &Delivery) -> Result<Value, JobError> {
+    match delivery.kind {
+        JobKind::Registration => ended::<Registering, RegistrationSummary>(app, &delivery.job).await,
+        JobKind::InverseRendering => ended::<Inverting, InverseRenderingSummary>(app, &delivery.job).await,
+    }
+}
+
+async fn ended<K: OfKind, V: Serialize + From<Job<K>>>(app: &App, id: &str) -> Result<Value, JobError> {
+    let id: JobId<K> = id.parse().map_err(|error: BadJobId| JobError::NotFound(error.to_string()))?;
+    let job = app.jobs.get(&id).await?;
+    let kind = format!("{}.{}", K::KIND.name(), job.status.name());
+    let timestamp = rfc3339(job.finished_at.unwrap_or(job.created_at));
+    Ok(json!({ "type": kind, "timestamp": timestamp, "data": V::from(job) }))
 }
 
 async fn deliver(app: &App, secret: &WebhookSecret, delivery: &Delivery) -> Result<(), String> {
     let config = &app.config.webhooks;
     let url = check_address(&delivery.url, config)
         .map_err(|_| "the address may not be told any more".to_owned())?;
-    let registration = match app.jobs.get(&delivery.registration).await {
-        Ok(registration) => registration,
+    let body = match body(app, delivery).await {
+        Ok(body) => body.to_string(),
         // It was deleted before it could be told.
         Err(JobError::NotFound(_)) => return Ok(()),
         Err(error) => return Err(error.to_string()),
     };
-    let kind = format!("registration.{}", registration.status.name());
-    let timestamp = registration.finished_at.unwrap_or(registration.created_at);
-    let data = RegistrationSummary::from(registration);
-    let body = json!({ "type": kind, "timestamp": rfc3339(timestamp), "data": data }).to_string();
     let now = jiff::Timestamp::now().as_second();
     let headers = [
         ("content-type", "application/json".to_owned()),

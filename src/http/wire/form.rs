@@ -37,6 +37,10 @@ pub struct TemplateForm {
     /// Its landmarks; a frozen collection has its own.
     #[schema(value_type = Binary, nullable = false)]
     landmarks: Option<Binary>,
+    /// How much each of its vertices takes of the scans' data, in any form that masks of scans have; a frozen collection has
+    /// its own.
+    #[schema(value_type = Binary, nullable = false)]
+    mask: Option<Binary>,
     /// What people call it.
     #[schema(nullable = false)]
     name: Option<Name>,

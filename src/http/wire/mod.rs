@@ -2,6 +2,7 @@
 
 pub mod capabilities;
 pub mod form;
+pub mod inverse_rendering;
 pub mod registration;
 pub mod scan;
 pub mod template;

@@ -8,9 +8,8 @@ use super::scan::Name;
 use super::template::TemplateView;
 use crate::http::problem::{Kind, Problem};
 use crate::job::event::Event;
-use crate::job::registration::{
-    Child, NewMember, NewRegistration, Priority, Registration, Status, TemplateChoice,
-};
+use crate::job::registration::{NewMember, NewRegistration, Registration, TemplateChoice};
+use crate::job::state::{Child, Priority, Status};
 use crate::pipeline::{Preset, Verdict};
 
 /// Scans to be registered onto one template.
@@ -423,8 +422,8 @@ impl From<Event> for EventView {
     }
 }
 
-impl From<crate::job::registration::Problem> for Failure {
-    fn from(problem: crate::job::registration::Problem) -> Self {
+impl From<crate::job::state::Problem> for Failure {
+    fn from(problem: crate::job::state::Problem) -> Self {
         Self { code: problem.code, detail: problem.detail }
     }
 }

@@ -11,6 +11,7 @@ use crate::job::template::StoredTemplate;
     "name": "studio head",
     "built_in": false,
     "frozen": false,
+    "masked": false,
     "vertices": 8210,
     "triangles": 16416,
     "scheme": "multipie68",
@@ -29,6 +30,8 @@ pub struct TemplateView {
     pub built_in: bool,
     /// Whether it is what a finished collection left: results then share that collection's landmarks and settings.
     pub frozen: bool,
+    /// Whether it was uploaded with a mask.
+    pub masked: bool,
     /// Number of vertices; of the built-in one, what it has unless `vertices` says otherwise.
     pub vertices: u64,
     /// Number of triangles.
@@ -57,6 +60,7 @@ impl TemplateView {
             name: Some("sphere, from the program's head where landmarks allow".to_owned()),
             built_in: true,
             frozen: false,
+            masked: false,
             vertices: vertices as u64,
             triangles: 2 * (vertices as u64 - 2),
             scheme: None,
@@ -74,6 +78,7 @@ impl From<StoredTemplate> for TemplateView {
             name: template.name,
             built_in: false,
             frozen: figures.frozen,
+            masked: template.parts.mask.is_some(),
             vertices: figures.vertices as u64,
             triangles: figures.triangles as u64,
             scheme: figures.scheme,

@@ -81,6 +81,13 @@ pub struct ScanParts {
     pub texture: Option<Sha256>,
 }
 
+impl ScanParts {
+    /// The digests of all of them.
+    pub fn digests(&self) -> impl Iterator<Item = Sha256> {
+        [Some(self.mesh), self.landmarks, self.mask, self.texture].into_iter().flatten()
+    }
+}
+
 /// An uploaded scan.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scan {

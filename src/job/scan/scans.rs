@@ -17,6 +17,7 @@ use crate::job::blobs::{Blobs, Kept};
 use crate::job::clock::now;
 use crate::job::database::Database;
 use crate::job::store_error::StoreError;
+use crate::job::sweep::collect_soon;
 
 /// The scans of a data folder; cheap to clone.
 #[derive(Debug, Clone)]
@@ -154,11 +155,10 @@ impl Scans {
     /// # Errors
     /// [`ScanError::NotFound`].
     pub async fn delete(&self, id: &ScanId) -> Result<(), ScanError> {
-        let query = sqlx::query("DELETE FROM scan WHERE id = ?").bind(id.as_str());
-        match query.execute(self.database.writer()).await?.rows_affected() {
-            0 => Err(ScanError::NotFound(id.clone())),
-            _ => Ok(()),
-        }
+        let query = sqlx::query("DELETE FROM scan WHERE id = ? RETURNING *").bind(id.as_str());
+        let deleted = found(id, query.fetch_optional(self.database.writer()).await?)?;
+        collect_soon(&self.database, &self.blobs, deleted.parts.digests().collect()).await;
+        Ok(())
     }
 
     /// Gives a scan its landmarks, mask or texture in place of those it had, and looks at all of it again.
@@ -166,6 +166,13 @@ impl Scans {
     /// # Errors
     /// [`ScanError::Fault`] if it does not go with the scan, which then stays as it was; [`ScanError::NotFound`].
     pub async fn set(&self, id: &ScanId, part: Part, file: Kept) -> Result<Scan, ScanError> {
+        let (scan, before) = self.replace(id, part, file).await?;
+        collect_soon(&self.database, &self.blobs, before.digests().collect()).await;
+        Ok(scan)
+    }
+
+    /// Sets a part; gives the scan, and the parts that it had.
+    async fn replace(&self, id: &ScanId, part: Part, file: Kept) -> Result<(Scan, ScanParts), ScanError> {
         loop {
             let old = self.get(id).await?.parts;
             let mut parts = old.clone();
@@ -175,7 +182,7 @@ impl Scans {
                 Part::Mask => parts.mask = digest,
                 Part::Texture => parts.texture = digest,
                 // A scan is its mesh: another one is another scan.
-                Part::Mesh => return self.get(id).await,
+                Part::Mesh => return Ok((self.get(id).await?, old)),
             }
             let report = self.report(&parts).await?;
             // Another part may have been set meanwhile, which the report then would not know.
@@ -193,7 +200,7 @@ impl Scans {
                 .fetch_optional(self.database.writer())
                 .await?;
             if let Some(row) = row {
-                return Ok(row.try_into()?);
+                return Ok((row.try_into()?, old));
             }
         }
     }

@@ -1,0 +1,47 @@
+//! A job's events as server-sent events.
+
+use std::convert::Infallible;
+use std::time::Duration;
+
+use axum::http::HeaderMap;
+use axum::response::sse::{Event as ServerEvent, KeepAlive, Sse};
+use axum::response::{IntoResponse, Response};
+use futures_util::StreamExt;
+
+use super::app::App;
+use super::problem::{Kind, Problem};
+use super::wire::registration::EventView;
+use crate::job::event::Event;
+use crate::job::{JobId, OfKind};
+
+/// How often something is sent when nothing happens, so that nobody on the way hangs up.
+const KEEP_ALIVE: Duration = Duration::from_secs(15);
+
+/// The events after the one that `Last-Event-ID` names, as they happen; ends after the last.
+///
+/// # Errors
+/// A [`Problem`].
+pub async fn stream<K: OfKind>(app: &App, id: &JobId<K>, headers: &HeaderMap) -> Result<Response, Problem> {
+    let after = match headers.get("last-event-id") {
+        None => 0,
+        Some(value) => value.to_str().ok().and_then(|text| text.trim().parse().ok()).ok_or_else(|| {
+            let remedy = "give the id of an event, or leave it out for all";
+            Problem::of_field(Kind::BadRequest, "Last-Event-ID", "is no number", remedy)
+        })?,
+    };
+    let feed = app.jobs.events_after(id, after).await?;
+    let ending = app.ending.clone();
+    let stream = futures_util::stream::unfold(feed, |mut feed| async move {
+        // A client that misses events for a failure comes back with the last that it has.
+        let event = feed.next().await.ok().flatten()?;
+        Some((Ok::<_, Infallible>(server_event(event)), feed))
+    });
+    let stream = stream.take_until(ending.cancelled_owned());
+    Ok(Sse::new(stream).keep_alive(KeepAlive::new().interval(KEEP_ALIVE)).into_response())
+}
+
+fn server_event(event: Event) -> ServerEvent {
+    let (id, name) = (event.sequence.to_string(), event.kind.name());
+    let data = serde_json::to_string(&EventView::from(event)).unwrap_or_default();
+    ServerEvent::default().id(id).event(name).data(data)
+}
