@@ -112,7 +112,7 @@ async fn crowd(
         let first = PERIOD.mul_f64(k as f64 / count as f64);
         tokio::spawn(async move {
             tokio::time::sleep(first).await;
-            if k % 2 == 0 {
+            if k.is_multiple_of(2) {
                 tokio::spawn(follow(address, format!("{path}/events"), ending.clone()));
             }
             poll(address, &path, &ending).await
