@@ -81,7 +81,7 @@ impl Figure {
 
     /// Six arms and two fins about a bulb.
     pub fn squid() -> Self {
-        Self::of("squid", &SQUID, 0.06)
+        Self::of("squid", &SQUID, 0.08)
     }
 
     /// All of them.

@@ -40,7 +40,7 @@ fn every_kind_of_png_is_the_same_picture() {
 #[test]
 fn pictures_are_reduced_in_light_not_in_their_code() {
     use ::png::{BitDepth, ColorType};
-    let samples = [255, 255, 0, 0, 0, 255, 255, 0, 9, 9];
+    let samples = [255, 255, 0, 0, 9, 255, 0, 255, 0, 9];
     let decoded = decode(&encoded([5, 2], ColorType::Grayscale, BitDepth::Eight, &samples)).unwrap();
     let reduced = decoded.reduced(2, Encoding::Srgb);
     assert_eq!(reduced.size, [2, 1], "the fifth column fills no square");

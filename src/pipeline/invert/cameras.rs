@@ -8,16 +8,16 @@ use super::silhouette::Silhouette;
 use crate::camera::{Intrinsics, Pose};
 
 /// The share of the silhouettes that the hull of good cameras covers at least.
-const GOOD: f64 = 0.95;
+const GOOD: f64 = 0.98;
 /// Below it the cameras are of no use.
 const USELESS: f64 = 0.5;
 /// What another reading of the cameras has to gain to be suggested.
 const GAIN: f64 = 0.1;
 /// Cells of the hulls that readings are compared by.
 const COARSE: usize = 32;
-/// A view beside whose silhouette so much of the others' hull lies, or that it covers no more of, disagrees with them.
-const STRAY_BESIDE: f64 = 0.05;
-const STRAY_COVERED: f64 = 0.9;
+/// What leaving one view out has to gain, and how many are tried.
+const GAIN_OF_ONE: f64 = 0.01;
+const SUSPECTS: usize = 5;
 
 /// A hull and what is thought of the cameras that gave it.
 #[derive(Debug)]
@@ -41,15 +41,12 @@ impl Agreement {
         if let Some(hull) = plain.clone().filter(|_| agreement >= GOOD) {
             return Ok(Self { hull, strays: Vec::new(), suspicion: None });
         }
-        if let Some(found) = without_strays(silhouettes, cells, agreement) {
+        if let Some(found) = without_strays(silhouettes, cells) {
             return Ok(found);
         }
         let suspicion = another_reading(silhouettes, agreement);
         match plain.filter(|hull| agreement >= USELESS && !hull.cells.is_empty()) {
-            Some(hull) => {
-                let strays = strays(&hull);
-                Ok(Self { hull, strays, suspicion })
-            }
+            Some(hull) => Ok(Self { hull, strays: Vec::new(), suspicion }),
             None => Err(InvertError::Cameras {
                 agreement: 100.0 * agreement,
                 remedy: suspicion.unwrap_or_else(|| {
@@ -60,29 +57,38 @@ impl Agreement {
     }
 }
 
-/// The hull that a fifth of the views at most need not agree with, and which these are; `None` if that does not help.
-fn without_strays(silhouettes: &[Silhouette], cells: usize, agreement: f64) -> Option<Agreement> {
-    let most = silhouettes.len() / 5;
-    (1..=most).find_map(|spared| {
-        let loose = Hull::carve(silhouettes, COARSE, spared)?;
-        let strays = strays(&loose);
-        if strays.is_empty() || strays.len() > most {
+/// The hull without a fifth of the views at most, and which these are; `None` if the others do not agree either.
+fn without_strays(silhouettes: &[Silhouette], cells: usize) -> Option<Agreement> {
+    let of = |kept: &[usize]| kept.iter().map(|&at| silhouettes[at].clone()).collect::<Vec<_>>();
+    let agreement = |kept: &[usize]| Hull::carve(&of(kept), COARSE, 0).map_or(0.0, |hull| hull.agreement());
+    let mut kept: Vec<usize> = (0..silhouettes.len()).collect();
+    let mut before = agreement(&kept);
+    for _ in 0..silhouettes.len() / 5 {
+        let without = |at: usize| kept.iter().copied().filter(|&other| other != at).collect::<Vec<_>>();
+        let tried = suspects(&of(&kept)).into_iter().map(|place| without(kept[place]));
+        let (found, others) =
+            tried.map(|others| (agreement(&others), others)).max_by(|a, b| a.0.total_cmp(&b.0))?;
+        if found < before + GAIN_OF_ONE {
             return None;
         }
-        let kept: Vec<Silhouette> = (silhouettes.iter().enumerate())
-            .filter(|(at, _)| !strays.contains(at))
-            .map(|(_, silhouette)| silhouette.clone())
-            .collect();
-        let hull = Hull::carve(&kept, cells, 0)?;
-        let helps = hull.agreement() >= GOOD && hull.agreement() > agreement;
-        helps.then_some(Agreement { hull, strays, suspicion: None })
-    })
+        (before, kept) = (found, others);
+        if before >= GOOD {
+            let hull = Hull::carve(&of(&kept), cells, 0)?;
+            let strays = (0..silhouettes.len()).filter(|at| !kept.contains(at)).collect();
+            return Some(Agreement { hull, strays, suspicion: None });
+        }
+    }
+    None
 }
 
-fn strays(hull: &Hull) -> Vec<usize> {
-    let stray = |(beside, covered): (&f64, &f64)| *beside > STRAY_BESIDE || *covered < STRAY_COVERED;
-    let each = hull.beside.iter().zip(&hull.covered);
-    each.enumerate().filter(|(_, shares)| stray(*shares)).map(|(at, _)| at).collect()
+/// The few silhouettes that fit the hull least which each may contradict once.
+fn suspects(silhouettes: &[Silhouette]) -> Vec<usize> {
+    let Some(loose) = Hull::carve(silhouettes, COARSE, 1) else { return Vec::new() };
+    let misfit = |at: &usize| loose.covered[*at] - loose.beside[*at];
+    let mut order: Vec<usize> = (0..silhouettes.len()).collect();
+    order.sort_by(|a, b| misfit(a).total_cmp(&misfit(b)));
+    order.truncate(SUSPECTS);
+    order
 }
 
 /// How else cameras are read by mistake, and what to tell whoever made the mistake.

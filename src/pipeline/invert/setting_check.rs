@@ -101,7 +101,7 @@ mod tests {
         let mut settings = settings();
         settings.set("levels.0.size", "300").unwrap();
         settings.set("what", "world-normal").unwrap();
-        settings.set("levels.0.smooth.laplacian.weight", "2").unwrap();
+        settings.set("levels.0.smooth", r#"{"laplacian": {"weight": 2}}"#).unwrap();
         settings
             .set("light", "[[1,1,1],[0,0,0],[0,-1,0],[0,0,0],[0,0,0],[0,0,0],[0,0,0],[0,0,0],[0,0,0]]")
             .unwrap();

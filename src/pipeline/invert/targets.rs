@@ -79,18 +79,15 @@ fn halved_weights(weights: &[f32], from: [u32; 2], to: [u32; 2]) -> Vec<f32> {
     (0..to[1]).flat_map(|y| (0..to[0]).map(move |x| least(x, y))).collect()
 }
 
-/// What stands behind the object: black, but behind shaded pictures, per channel, what is farthest from the object's mean
-/// colour, so that outlines show.
+/// What stands behind the object: black, but behind shaded pictures white where the object is dark, so that outlines show.
 pub(super) fn background(photographs: &[Photograph], shown: Shown) -> [f32; 3] {
     if shown != Shown::Shaded {
         return [0.0; 3];
     }
-    let (mut sum, mut area) = ([0.0; 3], 0.0);
-    for pixel in photographs.iter().flat_map(|photograph| &photograph.pixels.values) {
-        for (sum, value) in sum.iter_mut().zip(pixel) {
-            *sum += f64::from(*value);
-        }
-        area += f64::from(pixel[3]);
+    let (mut sum, mut area) = (0.0, 0.0);
+    for &[red, green, blue, opacity] in photographs.iter().flat_map(|photograph| &photograph.pixels.values) {
+        sum += f64::from(red + green + blue) / 3.0;
+        area += f64::from(opacity);
     }
-    sum.map(|sum| if sum < 0.5 * area { 1.0 } else { 0.0 })
+    if sum < 0.5 * area { [1.0; 3] } else { [0.0; 3] }
 }
