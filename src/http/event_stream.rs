@@ -7,6 +7,7 @@ use axum::http::HeaderMap;
 use axum::response::sse::{Event as ServerEvent, KeepAlive, Sse};
 use axum::response::{IntoResponse, Response};
 use futures_util::StreamExt;
+use utoipa::ToSchema;
 
 use super::app::App;
 use super::problem::{Kind, Problem};
@@ -17,6 +18,18 @@ use crate::job::{JobId, OfKind};
 /// How often something is sent when nothing happens, so that nobody on the way hangs up.
 const KEEP_ALIVE: Duration = Duration::from_secs(15);
 
+/// One event of a stream, by its lines.
+#[derive(ToSchema)]
+#[allow(dead_code, reason = "it describes what `server_event` writes")]
+pub struct ServerSentEvent {
+    /// The event's number, for `Last-Event-ID`.
+    id: String,
+    /// `status`, `stage`, `progress` or `child`.
+    event: String,
+    /// An `Event` in JSON.
+    data: String,
+}
+
 /// The events after the one that `Last-Event-ID` names, as they happen; ends after the last.
 ///
 /// # Errors
@@ -24,9 +37,9 @@ const KEEP_ALIVE: Duration = Duration::from_secs(15);
 pub async fn stream<K: OfKind>(app: &App, id: &JobId<K>, headers: &HeaderMap) -> Result<Response, Problem> {
     let after = match headers.get("last-event-id") {
         None => 0,
-        Some(value) => value.to_str().ok().and_then(|text| text.trim().parse().ok()).ok_or_else(|| {
+        Some(value) => value.to_str().ok().and_then(event_number).ok_or_else(|| {
             let remedy = "give the id of an event, or leave it out for all";
-            Problem::of_field(Kind::BadRequest, "Last-Event-ID", "is no number", remedy)
+            Problem::of_field(Kind::BadRequest, "Last-Event-ID", "is no event's number", remedy)
         })?,
     };
     let feed = app.jobs.events_after(id, after).await?;
@@ -38,6 +51,11 @@ pub async fn stream<K: OfKind>(app: &App, id: &JobId<K>, headers: &HeaderMap) ->
     });
     let stream = stream.take_until(ending.cancelled_owned());
     Ok(Sse::new(stream).keep_alive(KeepAlive::new().interval(KEEP_ALIVE)).into_response())
+}
+
+/// Numbers are those that a database holds: whole, not negative, below 2^63.
+fn event_number(text: &str) -> Option<u64> {
+    text.trim().parse().ok().filter(|&number| i64::try_from(number).is_ok())
 }
 
 fn server_event(event: Event) -> ServerEvent {

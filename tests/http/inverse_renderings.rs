@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 
 use crate::pictures::{QUICK, files, folder, form, zip};
 use crate::server::{Answer, Server};
-use crate::study::ended;
+use crate::study::{begun, ended};
 
 const FORM: &str = "multipart/form-data; boundary=b";
 
@@ -97,6 +97,7 @@ async fn it_is_listed_told_of_and_stopped_as_a_registration_is_but_is_none() {
         let other = server.get(&format!("/v1/registrations/{id}{method}")).await;
         assert_eq!(other.problem().0, 404, "{method}");
     }
+    begun(&server, &path).await;
     let early = server.get(&format!("{path}/mesh.glb")).await;
     assert_eq!(early.problem(), (409, "conflict".into()));
     let start = std::time::Instant::now();

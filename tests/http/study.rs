@@ -54,3 +54,14 @@ pub async fn ended(server: &Server, path: &str) -> Value {
     assert_eq!(events.headers["content-type"], "text/event-stream");
     server.get(path).await.json()
 }
+
+/// Waits until the job at `path` runs.
+pub async fn begun(server: &Server, path: &str) {
+    for _ in 0..600 {
+        if server.get(path).await.json()["status"] == "running" {
+            return;
+        }
+        tokio::time::sleep(std::time::Duration::from_millis(100)).await;
+    }
+    panic!("{path} does not begin");
+}

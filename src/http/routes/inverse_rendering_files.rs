@@ -7,12 +7,11 @@ use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
 use crate::http::app::App;
-use crate::http::event_stream::stream;
+use crate::http::event_stream::{ServerSentEvent, stream};
 use crate::http::extract::Id;
 use crate::http::job_answer::give;
 use crate::http::problem::Problem;
 use crate::http::wire::Binary;
-use crate::http::wire::registration::EventView;
 use crate::job::inverse_rendering::InverseRenderingId;
 use crate::job::result_file::ResultFile;
 
@@ -34,7 +33,7 @@ pub fn router() -> OpenApiRouter<App> {
         ("id" = String, Path, description = "The inverse rendering's id.", pattern = "^[0-9a-f]{32}$"),
         ("Last-Event-ID" = Option<u64>, Header, description = "The id of the last event that the client has.", minimum = 0, nullable = false),
     ),
-    responses((status = 200, description = "Events, each as it happens.", body = EventView, content_type = "text/event-stream",
+    responses((status = 200, description = "Events, each as it happens.", body = ServerSentEvent, content_type = "text/event-stream",
         example = "event: stage\nid: 3\ndata: {\"at\":\"2026-03-01T12:00:01Z\",\"event\":\"stage\",\"stage\":\"invert\"}\n\n")),
 )]
 async fn events(

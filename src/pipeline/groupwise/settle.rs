@@ -96,6 +96,8 @@ impl Settling<'_> {
         let mut force = vec![Vec3A::ZERO; p.len()];
         self.add_distances(matches, &mut force, &mut matrix);
         self.add_turns(matches, &mut force, &mut matrix);
+        // Triangles that are only partly for the scan do not take the rest of them along.
+        force.iter_mut().enumerate().for_each(|(i, force)| *force *= rest.takes(i));
         let system = SparseCholesky::new(topology, &matrix, rest.connectivity.dissection()).ok()?;
         system.solve(&mut force, buffer);
         Some(force)
