@@ -2,7 +2,7 @@ use glam::Vec3A;
 use rayon::prelude::*;
 
 use super::RestShape;
-use crate::mesh::Normals;
+use crate::mesh::{Normals, mean_edge_lengths};
 use crate::numeric::{SolveBuffer, SparseCholesky, SymmetricMatrix};
 use crate::pipeline::{ScanSurface, SettleSettings, SurfaceSample};
 use crate::spatial::{Hit, SurfaceIndex};
@@ -12,6 +12,10 @@ const REACH: f32 = 0.02;
 
 /// Cosine between the normals of sample and template below which they do not belong together.
 const LEAST_COSINE: f32 = 0.3;
+
+/// The farthest that a vertex moves, as a share of the mean length of its edges: a mesh that follows its scan needs less,
+/// and where it lies in a tangle it stays there rather than being drawn through itself.
+const FARTHEST: f32 = 0.15;
 
 /// Weight of a step against the data, so that vertices without any stay.
 const INERTIA: f64 = 1e-3;
@@ -31,11 +35,15 @@ pub fn settle(rest: &RestShape, scan: &ScanSurface, settings: &SettleSettings, p
     let topology = &rest.connectivity.topology;
     let mut last = nearest(scan, &SurfaceIndex::new(p, &topology.triangles));
     let mut buffer = SolveBuffer::default();
+    let before = p.to_vec();
+    let lengths = mean_edge_lengths(topology, p);
     for _ in 0..settings.iterations {
         let settling = Settling { rest, settings, p, normals: &Normals::new(topology, p) };
         let matches = settling.matches(scan, &mut last);
         let Some(step) = settling.step(&matches, &mut buffer) else { return };
-        p.iter_mut().zip(step).for_each(|(p, step)| *p += step);
+        for (i, p) in p.iter_mut().enumerate() {
+            *p = before[i] + (*p + step[i] - before[i]).clamp_length_max(FARTHEST * lengths[i]);
+        }
     }
 }
 
