@@ -62,10 +62,10 @@ fn a_textured_obj_and_its_ljson_are_read() {
     assert_eq!(read_landmarks(folder.join("james.ljson")).unwrap().present().count(), 68);
     let file = MeshFile::read(folder.join("james.obj")).unwrap();
     assert_eq!(file.warnings, [""; 0]);
-    let texture = file.texture.unwrap();
+    let texture = file.texture.as_ref().unwrap();
     assert_eq!(texture.images, [TextureImage::File(folder.join("james.jpg"))]);
-    assert!((0..file.polygons.len()).all(|polygon| texture.image(polygon).is_some()));
-    assert!((0..file.polygons.corners().len()).all(|corner| texture.coordinate(corner).is_some()));
+    assert!((0..file.polygons().len()).all(|polygon| texture.image(polygon).is_some()));
+    assert!((0..file.polygons().corners().len()).all(|corner| texture.coordinate(corner).is_some()));
     let coloured = MeshFile::read(folder.join("template.ply")).unwrap();
     assert_eq!(coloured.colours.unwrap().len(), coloured.mesh.positions().len());
 }

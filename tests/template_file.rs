@@ -39,7 +39,7 @@ fn source(folder: &Path, name: &str, bytes: &[u8]) -> MeshSource {
 
 /// Everything but positions is as it was, and positions are those that were given.
 fn assert_same_but_for(read: &MeshFile, before: &MeshFile, positions: &[DVec3], tolerance: f64) {
-    assert_eq!(read.polygons, before.polygons);
+    assert_eq!(read.polygons(), before.polygons());
     assert_eq!((&read.texture, &read.colours), (&before.texture, &before.colours));
     assert_eq!(read.mesh.positions().len(), positions.len());
     for (read, given) in read.mesh.positions().iter().zip(positions) {
@@ -50,7 +50,7 @@ fn assert_same_but_for(read: &MeshFile, before: &MeshFile, positions: &[DVec3], 
 /// Area-weighted unit normals of the vertices, by brute force over the polygons' fans.
 fn normals(file: &MeshFile, positions: &[DVec3]) -> Vec<DVec3> {
     let mut normals = vec![DVec3::ZERO; positions.len()];
-    for polygon in file.polygons.iter() {
+    for polygon in file.polygons().iter() {
         for k in 2..polygon.len() {
             let corners = [polygon[0], polygon[k - 1], polygon[k]].map(|i| i as usize);
             let [a, b, c] = corners.map(|i| positions[i]);
@@ -97,7 +97,7 @@ fn an_obj_keeps_all_but_its_numbers() {
     assert_eq!(String::from_utf8_lossy(&rewritten), String::from_utf8_lossy(&expected));
     let read = MeshFile::parse(&rewritten, MeshFormat::Obj).unwrap();
     assert_same_but_for(&read, &before.file, &moved(), 0.0);
-    assert_eq!(read.polygons.iter().map(<[u32]>::len).collect::<Vec<_>>(), [3, 4, 4]);
+    assert_eq!(read.polygons().iter().map(<[u32]>::len).collect::<Vec<_>>(), [3, 4, 4]);
 }
 
 #[test]
@@ -392,16 +392,16 @@ fn exports_have_polygons_coordinates_and_figures() {
     let names: [String; 7] = std::array::from_fn(|_| "0 0 1".to_owned());
     let MeshSource { file, .. } = source(folder.path(), "roof.obj", &obj(&roof(), &names));
     let written =
-        Obj { positions: &moved(), polygons: &file.polygons, texture: file.texture.as_ref() }.bytes();
+        Obj { positions: &moved(), polygons: &file.polygons(), texture: file.texture.as_ref() }.bytes();
     let read = MeshFile::parse(&written, MeshFormat::Obj).unwrap();
-    assert_eq!((&read.polygons, read.mesh.positions()), (&file.polygons, &moved()[..]));
+    assert_eq!((&read.polygons(), read.mesh.positions()), (&file.polygons(), &moved()[..]));
     let (read, texture) = (read.texture.unwrap(), file.texture.unwrap());
     assert_eq!((read.coordinates, read.corners), (texture.coordinates, texture.corners));
 
     let (figures, uv) = ([0.5; 7], [glam::DVec2::new(0.25, 0.125); 7]);
     let ply = Ply {
         positions: &moved(),
-        polygons: &file.polygons,
+        polygons: &file.polygons(),
         texture_coordinates: Some(&uv),
         scalars: vec![("residual", &figures)],
     };
@@ -411,7 +411,7 @@ fn exports_have_polygons_coordinates_and_figures() {
     let header = written.windows(11).position(|window| window == b"end_header\n").unwrap() + 11;
     assert_eq!(written[header + 32..header + 36], half, "three doubles and two floats come before");
     let read = MeshFile::parse(&written, MeshFormat::Ply).unwrap();
-    assert_eq!((&read.polygons, read.mesh.positions()), (&file.polygons, &moved()[..]));
+    assert_eq!((&read.polygons(), read.mesh.positions()), (&file.polygons(), &moved()[..]));
     assert_eq!(read.vertex_texture_coordinates().unwrap()[3], uv[3]);
 
     let many = Polygons::of_triangles(&[[0, 1, 2], [2, 1, 3]]);

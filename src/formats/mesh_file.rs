@@ -1,3 +1,4 @@
+use std::borrow::Cow;
 use std::path::Path;
 
 use glam::DVec2;
@@ -16,14 +17,14 @@ use crate::mesh::TriangleMesh;
 pub struct MeshFile {
     /// The surface, in the file's own space and units.
     pub mesh: TriangleMesh,
-    /// The polygons that the mesh's triangles were cut from, with the mesh's vertex indices.
-    pub polygons: Polygons,
     /// The colour of each vertex `[N, 4]`: red, green, blue, opacity, as the file has them, scaled to 0 to 255.
     pub colours: Option<Vec<[u8; 4]>>,
     /// Texture coordinates and the pictures they belong to.
     pub texture: Option<Texture>,
     /// Parts of the file, colours and textures among them, that are wrong or missing and that the mesh does without.
     pub warnings: Vec<String>,
+    /// The polygons that the mesh's triangles were cut from, where they are others.
+    cut: Option<Polygons>,
     /// How landmarks that name vertices and triangles of the file are to be understood.
     pub(super) order: FileOrder,
     /// Whether the file says that its x and y point to the right and to the front of a patient.
@@ -56,11 +57,24 @@ impl MeshFile {
         Ok(Self::parse_beside(bytes, format, &Siblings::none())?)
     }
 
+    /// The polygons that the mesh's triangles were cut from, with the mesh's vertex indices.
+    pub fn polygons(&self) -> Cow<'_, Polygons> {
+        match &self.cut {
+            Some(polygons) => Cow::Borrowed(polygons),
+            None => Cow::Owned(Polygons::of_triangles(self.mesh.triangles())),
+        }
+    }
+
+    /// The vertex of each of the polygons' corners.
+    pub(super) fn corners(&self) -> &[u32] {
+        self.cut.as_ref().map_or(self.mesh.triangles().as_flattened(), Polygons::corners)
+    }
+
     /// Texture coordinates `[N, 2]`, (0, 0) in the picture's upper left corner, if every vertex has one pair or none.
     pub fn vertex_texture_coordinates(&self) -> Option<Vec<DVec2>> {
         let texture = self.texture.as_ref()?;
         let mut of_vertices = vec![None; self.mesh.positions().len()];
-        for (corner, &vertex) in self.polygons.corners().iter().enumerate() {
+        for (corner, &vertex) in self.corners().iter().enumerate() {
             let own = texture.coordinate(corner)?;
             let slot = &mut of_vertices[vertex as usize];
             if slot.is_some_and(|other| other != own) {
@@ -105,9 +119,10 @@ impl MeshFile {
             MeshFormat::Stl => stl::read(bytes),
             MeshFormat::Gltf => gltf::read(bytes, siblings),
         }?;
-        let mesh = TriangleMesh::new(positions, polygons.triangles())?;
+        let (triangles, cut) = polygons.into_triangles();
+        let mesh = TriangleMesh::new(positions, triangles)?;
         let states_ras = states_ras(bytes);
-        Ok(Self { mesh, polygons, colours, texture, warnings, order, states_ras })
+        Ok(Self { mesh, cut, colours, texture, warnings, order, states_ras })
     }
 }
 

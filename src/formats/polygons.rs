@@ -1,3 +1,5 @@
+use std::ops::Range;
+
 /// The polygons of a mesh file as they stand in it: vertex indices, polygon after polygon.
 ///
 /// Each has three corners or more. A polygon is cut into the triangles that its first corner makes with each edge that
@@ -5,12 +7,15 @@
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Polygons {
     corners: Vec<u32>,
+    /// How many corners belong to polygons that have ended.
+    closed: usize,
+    /// Where each polygon ends; empty as long as all are triangles.
     ends: Vec<usize>,
 }
 
 impl Polygons {
     pub(super) fn with_capacity(polygons: usize) -> Self {
-        Self { corners: Vec::with_capacity(3 * polygons), ends: Vec::with_capacity(polygons) }
+        Self { corners: Vec::with_capacity(3 * polygons), ..Self::default() }
     }
 
     /// Triangles `[F, 3]` as polygons.
@@ -22,22 +27,17 @@ impl Polygons {
 
     /// The number of polygons P.
     pub fn len(&self) -> usize {
-        self.ends.len()
+        if self.all_triangles() { self.closed / 3 } else { self.ends.len() }
     }
 
     /// Whether there are none.
     pub fn is_empty(&self) -> bool {
-        self.ends.is_empty()
+        self.len() == 0
     }
 
     /// The vertex indices of all polygons, one after the other `[C]`.
     pub fn corners(&self) -> &[u32] {
         &self.corners
-    }
-
-    /// Where each polygon ends in [`corners`](Self::corners) `[P]`; it begins where the one before ends.
-    pub fn ends(&self) -> &[usize] {
-        &self.ends
     }
 
     /// The vertex indices of each polygon.
@@ -57,6 +57,20 @@ impl Polygons {
         triangles
     }
 
+    /// The same, and the polygons where they are not the triangles themselves.
+    pub(super) fn into_triangles(self) -> (Vec<[u32; 3]>, Option<Self>) {
+        if !self.all_triangles() {
+            return (self.triangles(), Some(self));
+        }
+        // Without a copy where the memory's size allows it.
+        let copied = |(_, corners): (_, Vec<u32>)| corners.as_chunks::<3>().0.to_vec();
+        (bytemuck::try_cast_vec(self.corners).unwrap_or_else(copied), None)
+    }
+
+    fn all_triangles(&self) -> bool {
+        self.ends.is_empty()
+    }
+
     /// Adds a corner to the polygon that is being read.
     pub(super) fn corner(&mut self, index: u32) {
         self.corners.push(index);
@@ -64,27 +78,35 @@ impl Polygons {
 
     /// Ends the polygon that is being read. One of fewer than three corners is left out, which `false` tells.
     pub(super) fn close(&mut self) -> bool {
-        let start = self.closed();
-        if self.corners.len() - start < 3 {
-            self.corners.truncate(start);
+        let corners = self.corners.len() - self.closed;
+        if corners < 3 {
+            self.corners.truncate(self.closed);
             return false;
         }
-        self.ends.push(self.corners.len());
+        if self.all_triangles() && corners > 3 {
+            self.ends.extend((0..self.closed).step_by(3).map(|start| start + 3));
+            self.ends.push(self.corners.len());
+        } else if !self.all_triangles() {
+            self.ends.push(self.corners.len());
+        }
+        self.closed = self.corners.len();
         true
     }
 
     /// Corners of the polygons that are closed.
     pub(super) fn closed(&self) -> usize {
-        self.ends.last().copied().unwrap_or(0)
+        self.closed
     }
 
     pub(super) fn push_triangle(&mut self, corners: [u32; 3]) {
         self.corners.extend(corners);
-        self.ends.push(self.corners.len());
+        self.close();
     }
 
-    fn ranges(&self) -> impl Iterator<Item = std::ops::Range<usize>> {
-        self.ends.iter().scan(0, |start, &end| Some(std::mem::replace(start, end)..end))
+    fn ranges(&self) -> impl Iterator<Item = Range<usize>> {
+        let triangles =
+            (0..if self.all_triangles() { self.closed / 3 } else { 0 }).map(|at| 3 * at..3 * at + 3);
+        triangles.chain(self.ends.iter().scan(0, |start, &end| Some(std::mem::replace(start, end)..end)))
     }
 }
 
@@ -105,6 +127,22 @@ mod tests {
         assert_eq!(polygons.triangles(), [[4, 5, 6], [4, 6, 7], [4, 7, 8], [3, 2, 1]]);
         assert_eq!(polygons.iter().map(<[u32]>::len).collect::<Vec<_>>(), [5, 3]);
         assert_eq!(polygons.triangle_corners().last(), Some([5, 6, 7]));
-        assert_eq!(polygons.ends(), [5, 8]);
+        assert_eq!(polygons.clone().into_triangles(), (polygons.triangles(), Some(polygons)));
+    }
+
+    #[test]
+    fn triangles_are_taken_over_as_they_are() {
+        let mut polygons = Polygons::with_capacity(2);
+        polygons.push_triangle([0, 1, 2]);
+        [2, 1, 3].into_iter().for_each(|index| polygons.corner(index));
+        assert!(polygons.close());
+        polygons.corner(9);
+        assert!(!polygons.close());
+        assert_eq!((polygons.len(), polygons.triangle_corners().last()), (2, Some([3, 4, 5])));
+        assert_eq!(polygons.into_triangles(), (vec![[0, 1, 2], [2, 1, 3]], None));
+        let mut mixed = Polygons::of_triangles(&[[0, 1, 2]]);
+        (0..4).for_each(|index| mixed.corner(index));
+        assert!(mixed.close());
+        assert_eq!(mixed.iter().map(<[u32]>::len).collect::<Vec<_>>(), [3, 4]);
     }
 }

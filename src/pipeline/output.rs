@@ -1,3 +1,4 @@
+use std::borrow::Cow;
 use std::path::PathBuf;
 
 use glam::DVec2;
@@ -121,7 +122,7 @@ impl ResultMesh<'_> {
     fn obj(&self, source: Option<&MeshSource>) -> Vec<u8> {
         let positions = self.mesh.positions();
         if let Some(MeshSource { file, .. }) = source {
-            return Obj { positions, polygons: &file.polygons, texture: file.texture.as_ref() }.bytes();
+            return Obj { positions, polygons: &file.polygons(), texture: file.texture.as_ref() }.bytes();
         }
         let polygons = Polygons::of_triangles(self.mesh.triangles());
         let texture = self.texture_coordinates.map(|uv| Texture::of_vertices(uv, &polygons));
@@ -130,12 +131,12 @@ impl ResultMesh<'_> {
 
     fn ply(&self, source: Option<&MeshSource>) -> Vec<u8> {
         let polygons = match source {
-            Some(source) => &source.file.polygons,
-            None => &Polygons::of_triangles(self.mesh.triangles()),
+            Some(source) => source.file.polygons(),
+            None => Cow::Owned(Polygons::of_triangles(self.mesh.triangles())),
         };
         Ply {
             positions: self.mesh.positions(),
-            polygons,
+            polygons: &polygons,
             texture_coordinates: self.texture_coordinates,
             scalars: self.figures.clone(),
         }

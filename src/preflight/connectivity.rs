@@ -1,3 +1,5 @@
+use std::ops::Range;
+
 use glam::DVec3;
 use rayon::prelude::*;
 use serde::Serialize;
@@ -45,58 +47,28 @@ pub struct BoundaryLoop {
     pub centre: [f64; 3],
 }
 
-/// A triangle's side: the edge, smaller vertex first, and the triangle with the corner that the side starts from.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-struct Side {
-    edge: u64,
-    corner: u32,
-}
-
 impl Connectivity {
     /// Of a mesh; sides of triangles that name a vertex twice are left out.
     pub fn of(mesh: &TriangleMesh) -> Self {
-        let triangles = mesh.triangles();
-        let sides = sorted_sides(triangles);
-        let mut found = Self::default();
-        let mut corners = Sets::new(3 * triangles.len());
-        let mut rim = Vec::new();
-        for group in sides.chunk_by(|one, next| one.edge == next.edge) {
-            match group {
-                [one] => rim.push(ends(triangles, one)),
-                [one, other] => found.join_fans(triangles, &mut corners, [one, other]),
-                _ => found.non_manifold_edges += 1,
-            }
+        const VERTICES: usize = 4096;
+        let (triangles, vertices) = (mesh.triangles(), mesh.positions().len());
+        let corners = CornersAt::new(vertices, triangles);
+        let starts: Vec<usize> = (0..vertices).step_by(VERTICES).collect();
+        let part = |&start: &usize| Fans::of(triangles, &corners, start..(start + VERTICES).min(vertices));
+        let parts: Vec<Fans> = starts.par_iter().map(part).collect();
+        drop(corners);
+        let (mut found, mut rim) = (Self::default(), Vec::new());
+        for part in parts {
+            found.non_manifold_edges += part.non_manifold_edges;
+            found.non_manifold_vertices += part.non_manifold_vertices;
+            found.opposed_edges += part.opposed_edges;
+            found.unreferenced_vertices += part.unreferenced_vertices;
+            rim.extend(part.rim);
         }
-        found.count_vertices(triangles, &mut corners, mesh.positions().len());
-        let part_of = components(mesh.positions().len(), triangles);
+        let part_of = components(vertices, triangles);
         let largest = found.add_components(mesh, &part_of);
         found.add_loops(mesh, &rim, |v| part_of[v as usize] == largest);
         found
-    }
-
-    /// Joins the corners of two triangles at both ends of the edge that they share.
-    fn join_fans(&mut self, triangles: &[[u32; 3]], corners: &mut Sets, [one, other]: [&Side; 2]) {
-        let [mut from, mut to] = [other.corner, next(other.corner)];
-        if ends(triangles, one) == ends(triangles, other) {
-            self.opposed_edges += 1;
-        } else {
-            std::mem::swap(&mut from, &mut to);
-        }
-        corners.join(one.corner, from);
-        corners.join(next(one.corner), to);
-    }
-
-    fn count_vertices(&mut self, triangles: &[[u32; 3]], corners: &mut Sets, vertices: usize) {
-        // A vertex has as many fans as its corners have sets.
-        let mut fans = vec![0_u32; vertices];
-        for corner in 0..3 * triangles.len() as u32 {
-            let vertex = triangles[corner as usize / 3][corner as usize % 3] as usize;
-            if corners.of(corner) == corner {
-                fans[vertex] += 1;
-            }
-        }
-        self.non_manifold_vertices = fans.iter().filter(|&&count| count > 1).count();
-        self.unreferenced_vertices = fans.iter().filter(|&&count| count == 0).count();
     }
 
     /// Collects the parts, and the largest part's volume without its rims' fans; returns the largest part.
@@ -143,28 +115,98 @@ impl Connectivity {
     }
 }
 
-fn sorted_sides(triangles: &[[u32; 3]]) -> Vec<Side> {
-    let mut sides: Vec<Side> = (0..3 * triangles.len() as u32)
-        .filter_map(|corner| {
-            let own = &triangles[corner as usize / 3];
-            let whole = own[0] != own[1] && own[1] != own[2] && own[2] != own[0];
-            let (from, to) = (own[corner as usize % 3], own[(corner as usize + 1) % 3]);
-            let edge = (u64::from(from.min(to)) << 32) | u64::from(from.max(to));
-            whole.then_some(Side { edge, corner })
-        })
-        .collect();
-    sides.par_sort_unstable();
-    sides
+/// The triangles around some vertices.
+#[derive(Default)]
+struct Fans {
+    /// Edges of one triangle only, as it runs along them.
+    rim: Vec<[u32; 2]>,
+    non_manifold_edges: usize,
+    non_manifold_vertices: usize,
+    opposed_edges: usize,
+    unreferenced_vertices: usize,
 }
 
-/// The corner after one in its triangle.
-fn next(corner: u32) -> u32 {
-    corner - corner % 3 + (corner + 1) % 3
+/// A triangle's side at one of its ends.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Spoke {
+    /// The other end.
+    to: u32,
+    /// The triangle's corner here, by its place among those of this end.
+    corner: u32,
+    /// Whether the triangle runs from here to there.
+    leaves: bool,
 }
 
-/// The vertices from which and to which a side runs.
-fn ends(triangles: &[[u32; 3]], side: &Side) -> [u32; 2] {
-    [side.corner, next(side.corner)].map(|corner| triangles[corner as usize / 3][corner as usize % 3])
+impl Fans {
+    /// Every edge counts at its smaller vertex.
+    fn of(triangles: &[[u32; 3]], corners: &CornersAt, vertices: Range<usize>) -> Self {
+        let (mut found, mut spokes, mut sets) = (Self::default(), Vec::new(), Sets::default());
+        for vertex in vertices {
+            let own = corners.of(vertex);
+            spokes.clear();
+            for (place, &corner) in own.iter().enumerate() {
+                let [a, b, c] = triangles[corner as usize / 3];
+                if a != b && b != c && c != a {
+                    let [next, last] = [[b, c], [c, a], [a, b]][corner as usize % 3];
+                    let spoke = |to, leaves| Spoke { to, corner: place as u32, leaves };
+                    spokes.extend([spoke(next, true), spoke(last, false)]);
+                }
+            }
+            spokes.sort_unstable();
+            sets.reset(own.len());
+            for edge in spokes.chunk_by(|one, next| one.to == next.to) {
+                found.add_edge(vertex as u32, edge, &mut sets);
+            }
+            // A vertex has as many fans as its corners have sets.
+            found.non_manifold_vertices += usize::from(sets.count() > 1);
+            found.unreferenced_vertices += usize::from(own.is_empty());
+        }
+        found
+    }
+
+    fn add_edge(&mut self, from: u32, edge: &[Spoke], sets: &mut Sets) {
+        let counts = from < edge[0].to;
+        match edge {
+            [one] if counts => self.rim.push(if one.leaves { [from, one.to] } else { [one.to, from] }),
+            [_] => {}
+            [one, other] => {
+                sets.join(one.corner, other.corner);
+                self.opposed_edges += usize::from(counts && one.leaves == other.leaves);
+            }
+            _ => self.non_manifold_edges += usize::from(counts),
+        }
+    }
+}
+
+/// The corners of triangles, `3 f + k` the k-th of triangle f, by their vertices.
+struct CornersAt {
+    /// Where the corners of each vertex begin, and the last end `[N + 1]`.
+    starts: Vec<u32>,
+    corners: Vec<u32>,
+}
+
+impl CornersAt {
+    fn new(vertices: usize, triangles: &[[u32; 3]]) -> Self {
+        let mut starts = vec![0; vertices + 1];
+        triangles.iter().flatten().for_each(|&vertex| starts[vertex as usize] += 1);
+        let mut end = 0;
+        for start in &mut starts {
+            end += *start;
+            *start = end;
+        }
+        // Filled from behind, so that each start ends where it belongs and the corners ascend.
+        let mut corners = vec![0; end as usize];
+        for (corner, &vertex) in triangles.as_flattened().iter().enumerate().rev() {
+            let start = &mut starts[vertex as usize];
+            *start -= 1;
+            corners[*start as usize] = corner as u32;
+        }
+        Self { starts, corners }
+    }
+
+    fn of(&self, vertex: usize) -> &[u32] {
+        &self.corners[self.starts[vertex] as usize..self.starts[vertex + 1] as usize]
+    }
 }
 
 /// Directed edges `[E, 2]`, chained end to end as far as they go; against their direction only where there is no other
@@ -206,11 +248,14 @@ fn chains(edges: &[[u32; 2]]) -> Vec<Vec<[u32; 2]>> {
 }
 
 /// Disjoint sets of numbers; a set is known by its smallest.
+#[derive(Default)]
 struct Sets(Vec<u32>);
 
 impl Sets {
-    fn new(count: usize) -> Self {
-        Self((0..count as u32).collect())
+    /// Each number below `count` alone.
+    fn reset(&mut self, count: usize) {
+        self.0.clear();
+        self.0.extend(0..count as u32);
     }
 
     fn of(&mut self, mut member: u32) -> u32 {
@@ -225,6 +270,10 @@ impl Sets {
     fn join(&mut self, one: u32, other: u32) {
         let (one, other) = (self.of(one), self.of(other));
         self.0[one.max(other) as usize] = one.min(other);
+    }
+
+    fn count(&self) -> usize {
+        self.0.iter().enumerate().filter(|&(member, &above)| member as u32 == above).count()
     }
 }
 

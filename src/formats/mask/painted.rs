@@ -61,7 +61,7 @@ impl Painted {
             return Err(Fault::at("the mask", problem));
         }
         let mut sums = vec![(0.0, 0.0); mesh.mesh.positions().len()];
-        for (corner, &vertex) in mesh.polygons.corners().iter().enumerate() {
+        for (corner, &vertex) in mesh.corners().iter().enumerate() {
             if let Some(at) = texture.coordinate(corner) {
                 let (sum, count) = &mut sums[vertex as usize];
                 *sum += self.level_at(at, texture.origin);

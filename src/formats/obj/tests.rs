@@ -89,7 +89,8 @@ fn polygons_coordinates_and_pictures_are_kept_as_they_are() {
     write("pic/skin 1.png", "not looked at");
     let mut file = file_in(folder.path());
     file.warnings.retain(|warning| !warning.contains("colours"));
-    let polygons: Vec<_> = file.polygons.iter().collect();
+    let polygons = file.polygons();
+    let polygons: Vec<_> = polygons.iter().collect();
     assert_eq!(polygons, [&[0, 1, 2][..], &[0, 1, 2, 3], &[0, 1, 3]]);
     assert_eq!(file.mesh.triangles(), [[0, 1, 2], [0, 1, 2], [0, 2, 3], [0, 1, 3]]);
     let texture = file.texture.unwrap();

@@ -42,7 +42,7 @@ fn corners_in_the_same_place_are_one_vertex() {
         let file = read(&bytes);
         assert_eq!(file.mesh.triangles(), [[0, 1, 2], [0, 2, 3]]);
         assert_eq!(file.mesh.positions(), CORNERS.map(|corner| DVec3::from(corner.map(f64::from))));
-        assert_eq!(file.polygons.len(), 2);
+        assert_eq!(file.polygons().len(), 2);
     }
     let twice = ascii() + "\r\n" + &ascii().replace("1 1 0", "1 1 5");
     assert_eq!(read(twice.as_bytes()).mesh.triangles().len(), 4);

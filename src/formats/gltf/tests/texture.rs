@@ -134,6 +134,6 @@ fn a_long_material_may_be_shared_by_many_primitives() {
     let primitive = document["meshes"][0]["primitives"][0].clone();
     document["meshes"][0]["primitives"] = json!(vec![primitive; 1000]);
     let read = file(&document);
-    assert_eq!((read.polygons.len(), read.warnings.len()), (1000, 0));
+    assert_eq!((read.polygons().len(), read.warnings.len()), (1000, 0));
     assert!(read.texture.unwrap().polygon_images.iter().all(|&image| image == 0));
 }
