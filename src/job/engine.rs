@@ -19,6 +19,7 @@ use super::graph::{self, Changed, Claim, Done};
 use super::inputs::Inputs;
 use super::record::{Fractions, add_event};
 use super::settings::JobSettings;
+use super::snapshots::Snapshots;
 use super::state::Problem;
 use super::store_error::StoreError;
 use super::work::{Decided, Fault, Produced};
@@ -41,6 +42,7 @@ pub(super) struct Engine {
     pub blobs: Blobs,
     pub settings: JobSettings,
     pub cache: Cache,
+    pub snapshots: Snapshots,
     compute: Compute,
     /// The steps that run, by their ids.
     running: Mutex<HashMap<i64, Arc<Control>>>,
@@ -99,6 +101,7 @@ impl Engine {
             .map_err(|error| StoreError::Folder { path: folder.path().to_owned(), error })?;
         Ok(Self {
             cache: Cache::new(settings.cache_bytes),
+            snapshots: Snapshots::default(),
             compute,
             folder,
             database,
@@ -325,7 +328,7 @@ impl Engine {
     /// Commits a change with the tickets for the steps that it made ready, and tells of it.
     pub async fn commit(&self, mut tx: Transaction<'_, Sqlite>, changed: Changed) -> Result<(), StoreError> {
         // Workers that are at it go on by themselves.
-        let idle = self.settings.threads.saturating_sub(self.busy.load(Ordering::Relaxed));
+        let idle = self.settings.steps().saturating_sub(self.busy.load(Ordering::Relaxed));
         queue::push(&mut tx, changed.ready.min(idle)).await?;
         tx.commit().await?;
         let dropped = changed.dropped.clone();
@@ -337,6 +340,7 @@ impl Engine {
 
     /// Tells of a change that is committed.
     fn publish(&self, changed: Changed) {
+        self.snapshots.forget();
         let mut feeds = lock(&self.feeds);
         for (job, event) in changed.events {
             let last = event.kind.is_last();
@@ -356,7 +360,7 @@ impl Engine {
         if !changed.ended.is_empty() {
             self.finished.send_modify(|count| *count += changed.ended.len() as u64);
         }
-        for _ in 0..changed.ready.min(self.settings.threads) {
+        for _ in 0..changed.ready.min(self.settings.steps()) {
             self.wake.notify_one();
         }
     }

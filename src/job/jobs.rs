@@ -109,10 +109,17 @@ impl Jobs {
     /// # Errors
     /// [`JobError::NotFound`].
     pub async fn get<K: OfKind>(&self, id: &JobId<K>) -> Result<Job<K>, JobError> {
+        let snapshots = &self.engine.snapshots;
+        let generation = match snapshots.get(id.as_str()) {
+            Ok(job) => return Ok(Arc::unwrap_or_clone(job)),
+            Err(generation) => generation,
+        };
         // One transaction, so that what is said of its scans goes with what is said of it.
         let mut tx = self.engine.database.reader().begin().await?;
         let found = record::whole(&mut tx, id, &self.engine.fractions()).await?;
-        found.ok_or_else(|| no_such(id))
+        let job = Arc::new(found.ok_or_else(|| no_such(id))?);
+        snapshots.keep(generation, id.as_str(), &job);
+        Ok(Arc::unwrap_or_clone(job))
     }
 
     /// Some of them, the latest first, without their children.

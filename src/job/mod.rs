@@ -41,6 +41,7 @@ pub mod registration;
 /// Files that jobs leave.
 pub mod result_file;
 mod settings;
+mod snapshots;
 mod source;
 mod stage;
 /// How jobs stand.

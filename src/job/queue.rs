@@ -10,7 +10,7 @@ use std::time::Duration;
 use apalis::prelude::*;
 use apalis_sqlite::queries::push_tasks;
 use apalis_sqlite::{Config, SqliteStorage};
-use futures_util::StreamExt;
+use futures_util::{Stream, StreamExt};
 use serde::{Deserialize, Serialize};
 use sqlx::sqlite::SqliteConnection;
 
@@ -67,7 +67,7 @@ pub(super) async fn reconcile(engine: &Engine) -> Result<(), StoreError> {
         FROM step WHERE state IN ('ready', 'running')";
     let (ready, running): (i64, i64) = sqlx::query_as(open).fetch_one(engine.database.reader()).await?;
     let known = engine.running();
-    if running <= known.len() as i64 && (ready == 0 || known.len() >= engine.settings.threads) {
+    if running <= known.len() as i64 && (ready == 0 || known.len() >= engine.settings.steps()) {
         return Ok(());
     }
     let mut tx = engine.database.begin_write().await?;
@@ -78,7 +78,7 @@ pub(super) async fn reconcile(engine: &Engine) -> Result<(), StoreError> {
     let waiting = "SELECT count(*) FROM Jobs WHERE status = 'Pending'";
     let waiting: i64 = sqlx::query_scalar(waiting).fetch_one(&mut *tx).await?;
     if waiting == 0 {
-        push(&mut tx, engine.settings.threads).await?;
+        push(&mut tx, engine.settings.steps()).await?;
     }
     tx.commit().await?;
     engine.wake.notify_one();
@@ -108,18 +108,14 @@ pub(super) async fn work(engine: Arc<Engine>) {
     let monitor = Monitor::new().register(move |restarts| {
         let config = Config::default().queue(QUEUE).batch_size(1).persist_results(false);
         let config = config.heartbeat_interval(Duration::from_secs(5)).missed_heartbeats(3);
-        let signs = futures_util::stream::unfold(engine.clone(), |engine| async {
-            // Whichever comes first.
-            let _ = tokio::time::timeout(LOOK, engine.wake.notified()).await;
-            Some(((), engine))
-        });
+        let signs = signs(engine.clone());
         let storage = SqliteStorage::<Ticket>::new(engine.database.writer()).with_config(config);
         // Names are new at every start and restart: the engine takes a known one for alive.
         WorkerBuilder::new(format!("{boot}-{restarts}"))
-            .backend(storage.poll_with_stream(signs.boxed()))
+            .backend(storage.poll_with_stream(signs))
             .data(engine.clone())
             .catch_panic()
-            .concurrency(engine.settings.threads)
+            .concurrency(engine.settings.steps())
             .build(take)
     });
     let monitor = monitor.should_restart(|_, error| {
@@ -134,6 +130,24 @@ pub(super) async fn work(engine: Arc<Engine>) {
     if let Err(error) = monitor.run_with_signal(closed).await {
         tracing::error!(%error, "the queue ended");
     }
+}
+
+/// When to look for tickets.
+fn signs(engine: Arc<Engine>) -> impl Stream<Item = ()> + Send + Unpin + 'static {
+    let signs = futures_util::stream::unfold(engine, |engine| async {
+        // Whichever comes first.
+        let _ = tokio::time::timeout(LOOK, engine.wake.notified()).await;
+        Some(((), engine))
+    });
+    let mut signs = signs.boxed();
+    futures_util::stream::poll_fn(move |cx| {
+        let sign = signs.poll_next_unpin(cx);
+        if sign.is_ready() {
+            // The engine forgets to wait for the next sign when one comes just as it finds no ticket: it is to ask again.
+            cx.waker().wake_by_ref();
+        }
+        sign
+    })
 }
 
 /// Does steps as long as there are some.

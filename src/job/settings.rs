@@ -7,7 +7,7 @@ use crate::render::AdapterChoice;
 /// How jobs are worked on, and their limits.
 #[derive(Debug, Clone)]
 pub struct JobSettings {
-    /// Threads that compute, and steps that run at the same time.
+    /// Threads that compute.
     pub threads: usize,
     /// Scans of one job.
     pub scans: usize,
@@ -31,6 +31,13 @@ pub struct JobSettings {
     pub capture_limits: CaptureLimits,
     /// What inverse renderings are drawn with.
     pub adapter: AdapterChoice,
+}
+
+impl JobSettings {
+    /// Steps that run at the same time: of several threads none has nothing to do while a step is stored.
+    pub fn steps(&self) -> usize {
+        if self.threads > 1 { self.threads + 1 } else { 1 }
+    }
 }
 
 impl Default for JobSettings {

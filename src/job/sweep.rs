@@ -89,6 +89,7 @@ pub(super) async fn expire(engine: &Engine) -> Result<(), StoreError> {
     sqlx::query("DELETE FROM job WHERE expires_at < ?").bind(now()).execute(&mut *tx).await?;
     sqlx::query("DELETE FROM scan WHERE expires_at < ?").bind(now()).execute(&mut *tx).await?;
     tx.commit().await?;
+    engine.snapshots.forget();
     collect_all(engine).await?;
     Ok(())
 }

@@ -36,7 +36,11 @@ pub fn clients(count: usize) -> anyhow::Result<()> {
     let heads = sculpt(SCANS, TRIANGLES);
     let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().build()?;
     // Of their own, so that it is the server's threads that answers wait for.
-    let of_clients = tokio::runtime::Builder::new_multi_thread().worker_threads(1).enable_all().build()?;
+    let of_clients = tokio::runtime::Builder::new_multi_thread()
+        .worker_threads(1)
+        .thread_name("clients")
+        .enable_all()
+        .build()?;
     runtime.block_on(async {
         let folder = tempfile::tempdir()?;
         let mut config = Config::default();
