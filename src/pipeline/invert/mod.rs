@@ -40,6 +40,7 @@ use super::settings::{Preset, Settings};
 use super::sphere::Sphere;
 use crate::formats::Photograph;
 use crate::mesh::{Normals, TriangleMesh};
+use crate::numeric::SolveBuffer;
 use crate::render::{Light, MeshLayout, Renderer, Surface};
 use cameras::Agreement;
 use descent::{Descent, Matched, State};
@@ -182,8 +183,12 @@ impl<'a> Scene<'a> {
             return Ok(sphere.rest.iter().map(|p| *p * self.start_radius as f32).collect());
         };
         let fit = Settings::for_fit(Preset::Default, sphere.rest.len())?.fit;
-        let positions = fit_scan("hull", &surface, &fit, observer)?;
-        Ok(positions.into_iter().map(|p| self.space.to_unit(p)).collect())
+        let fitted = fit_scan("hull", &surface, &fit, observer)?;
+        let mut positions: Vec<Vec3A> = fitted.into_iter().map(|p| self.space.to_unit(p)).collect();
+        // The hull's cells leave steps that only many iterations would wear off.
+        let smoothing = sphere.reparameterization(settings.hull_diffusion);
+        smoothing.to_positions(&mut positions, &mut SolveBuffer::default());
+        Ok(positions)
     }
 
     /// The views that agree, at a level's size.

@@ -56,6 +56,7 @@ impl InvertSettings {
             most_views: 200,
             hull_cells: 80,
             hull_fit: preset == InvertPreset::Default,
+            hull_diffusion: 1.0,
             start_radius: 1.0,
             levels,
         })
@@ -112,21 +113,21 @@ fn paper(level: u32, scene: &Scene) -> InvertLevel {
 }
 
 /// The hull gives the outlines, so that no level has far to go; small pictures and a few views at a time suffice while the
-/// mesh is coarse.
+/// mesh is coarse. What is left then is small, and a small lambda lets it in.
 fn coarse_to_fine(finest: u32) -> Vec<InvertLevel> {
-    let level = |level: u32| {
-        let depth = level.saturating_sub(4) as usize;
-        InvertLevel {
-            level,
-            size: [256, 512, 512][depth],
-            batch: 8,
-            iterations: [200, 150, 150][depth],
-            lambda: 5.0,
-            rate: [5e-2, 2e-2, 1e-2][depth],
-            rate_end: 0.1,
-            density: Density::Off,
-            smooth: Smooth::Off,
-        }
+    let coarsest = finest.min(4);
+    let level = |level: u32, size, iterations, lambda, [rate, rate_end]: [f32; 2]| InvertLevel {
+        level,
+        size,
+        batch: 8,
+        iterations,
+        lambda,
+        rate,
+        rate_end,
+        density: Density::Off,
+        smooth: Smooth::Off,
     };
-    (finest.min(4)..=finest).map(level).collect()
+    let finer = (coarsest + 1).min(finest)..=finest;
+    let first = level(coarsest, 256, 300, 5.0, [3e-2, 0.3]);
+    std::iter::once(first).chain(finer.map(|k| level(k, 512, 200, 2.0, [1e-2, 0.05]))).collect()
 }

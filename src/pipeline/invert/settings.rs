@@ -93,6 +93,8 @@ pub struct InvertSettings {
     pub hull_cells: usize,
     /// Whether the first level's sphere is fitted to the hull's surface as to a scan, before any picture is looked at.
     pub hull_fit: bool,
+    /// lambda of the diffusion (I + lambda L)^-1 that smooths what was fitted to the hull.
+    pub hull_diffusion: f64,
     /// Radius of the sphere otherwise, in those of the ball with the hull's volume.
     pub start_radius: f32,
     /// The levels in order, each on the same sphere as the one before or on its subdivision.
