@@ -29,7 +29,7 @@ const KEPT: [(&str, &[&str]); 25] = [
     ("opentelemetry_otlp", &["cli/span_export.rs"]),
     ("tracing_opentelemetry", &["cli/span_export.rs"]),
     ("wgpu", &["render/"]),
-    ("bytemuck", &["render/"]),
+    ("bytemuck", &["render/", "formats/polygons.rs"]),
     ("pollster", &["render/"]),
 ];
 

@@ -149,6 +149,42 @@ fn one_scan_is_fitted_and_measured() {
 }
 
 #[test]
+fn what_pictures_are_taken_of_is_made_again_and_registered() {
+    let folder = tempfile::tempdir().unwrap();
+    let scans = folder.path().join("scans");
+    let names = write_collection(&scans, 2);
+    for name in &names {
+        let own = scans.join(name);
+        let (scan, pictures, mesh) = (own.join("scan.ply"), folder.path().join(name), own.join("made.glb"));
+        let taken =
+            ["--views", "8", "--size", "64", "--samples", "2", "--adapter", "reference"].map(Path::new);
+        let capture = [Path::new("capture"), &scan, Path::new("-o"), &pictures];
+        succeeded(&onemesh(capture.iter().chain(&taken)));
+        assert!(pictures.join("transforms.json").exists());
+        let quick =
+            ["--vertices", "642", "--set", "levels.0.iterations=40", "--set", "levels.1.iterations=20"];
+        let quick = quick.into_iter().chain(["--adapter", "reference"]).map(Path::new).collect::<Vec<_>>();
+        let invert = [Path::new("invert"), &pictures, Path::new("-o"), &mesh];
+        succeeded(&onemesh(invert.iter().chain(&quick)));
+        validate(&mesh);
+        let said = succeeded(&onemesh([Path::new("evaluate"), &scan, &mesh]));
+        let measured: Value = serde_json::from_str(&said).unwrap();
+        assert!(measured["mean_chamfer"].as_f64().unwrap() < 2e-3, "{said}");
+    }
+    let entry = |name: &String| {
+        let path = |file: &str| scans.join(name).join(file).display().to_string();
+        serde_json::json!({ "name": name, "mesh": path("made.glb"), "landmarks": path("landmarks.json") })
+    };
+    let list = folder.path().join("collection.json");
+    let scans: Vec<Value> = names.iter().map(entry).collect();
+    fs::write(&list, serde_json::json!({ "scans": scans }).to_string()).unwrap();
+    let out = folder.path().join("out");
+    onemesh(quick_register(&list, &out));
+    let [a, b] = [0, 1].map(|k: usize| read_mesh(out.join(format!("{}.glb", names[k]))).unwrap());
+    assert_eq!(a.triangles(), b.triangles());
+}
+
+#[test]
 fn scans_and_collections_are_looked_at_first() {
     let folder = tempfile::tempdir().unwrap();
     let scans = folder.path().join("scans");

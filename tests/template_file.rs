@@ -395,7 +395,7 @@ fn exports_have_polygons_coordinates_and_figures() {
         Obj { positions: &moved(), polygons: &file.polygons(), texture: file.texture.as_ref() }.bytes();
     let read = MeshFile::parse(&written, MeshFormat::Obj).unwrap();
     assert_eq!((&read.polygons(), read.mesh.positions()), (&file.polygons(), &moved()[..]));
-    let (read, texture) = (read.texture.unwrap(), file.texture.unwrap());
+    let (read, texture) = (read.texture.unwrap(), file.texture.clone().unwrap());
     assert_eq!((read.coordinates, read.corners), (texture.coordinates, texture.corners));
 
     let (figures, uv) = ([0.5; 7], [glam::DVec2::new(0.25, 0.125); 7]);

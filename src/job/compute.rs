@@ -1,16 +1,23 @@
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicU8, AtomicU32, Ordering};
-use std::sync::{Arc, PoisonError, RwLock};
+use std::sync::{Arc, Mutex};
 
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use tokio::sync::oneshot;
 
+use super::engine::lock;
 use crate::pipeline::{Observer, Progress};
 
-/// The threads that compute; no request waits on them, and they wait for none.
+/// Most threads that one step computes on.
+const WIDEST: usize = 4;
+
+/// The threads that compute; no request waits on them, and they wait for none. A step has some to itself while it runs:
+/// on threads that all share, one that waits for a part of its step takes up another step meanwhile, and the first one
+/// waits for all of that.
 pub(super) struct Compute {
-    threads: usize,
-    pool: RwLock<Arc<ThreadPool>>,
+    /// Threads of a step.
+    width: usize,
+    idle: Arc<Mutex<Vec<Arc<ThreadPool>>>>,
 }
 
 /// A step panicked, which is a fault of ours.
@@ -18,37 +25,34 @@ pub(super) struct Compute {
 pub(super) struct Panicked(pub String);
 
 impl Compute {
-    /// So many threads.
+    /// For so many steps at the same time, as many threads as there are for each.
     ///
     /// # Errors
-    /// What the system says if it gives none.
+    /// What the system says if it gives no threads.
     pub fn new(threads: usize) -> std::io::Result<Self> {
-        let threads = threads.max(1);
-        Ok(Self { threads, pool: RwLock::new(pool(threads)?) })
+        let width = threads.clamp(1, WIDEST);
+        let pools = (0..threads.max(1)).map(|_| pool(width)).collect::<Result<_, _>>()?;
+        Ok(Self { width, idle: Arc::new(Mutex::new(pools)) })
     }
 
-    /// Does work on the threads. Who stops waiting does not stop it.
+    /// Does work on threads of its own. Who stops waiting does not stop it, and leaves these threads to it.
     pub async fn run<T: Send + 'static>(
         &self,
         work: impl FnOnce() -> T + Send + 'static,
     ) -> Result<T, Panicked> {
         let (send, receive) = oneshot::channel();
-        let pool = self.pool.read().unwrap_or_else(PoisonError::into_inner).clone();
-        let span = tracing::Span::current();
-        pool.spawn(move || {
+        let known = lock(&self.idle).pop();
+        let own = known.map_or_else(|| pool(self.width), Ok);
+        let own = own.map_err(|error| Panicked(format!("no thread can be started: {error}")))?;
+        let (span, idle, returned) = (tracing::Span::current(), self.idle.clone(), own.clone());
+        own.spawn(move || {
             let _within = span.entered();
             let result = catch_unwind(AssertUnwindSafe(work)).map_err(|panic| Panicked(message(&*panic)));
+            lock(&idle).push(returned);
             // Nobody may wait for it any more.
             let _ = send.send(result);
         });
         receive.await.unwrap_or_else(|_| Err(Panicked("its thread ended".to_owned())))
-    }
-
-    /// Leaves the threads to what does not stop, and takes new ones.
-    pub fn renew(&self) {
-        if let Ok(new) = pool(self.threads) {
-            *self.pool.write().unwrap_or_else(PoisonError::into_inner) = new;
-        }
     }
 }
 
@@ -135,9 +139,23 @@ mod tests {
         let (end, wait) = std::sync::mpsc::channel::<()>();
         let stuck = compute.run(move || wait.recv().is_ok());
         assert!(tokio::time::timeout(std::time::Duration::from_millis(50), stuck).await.is_err());
-        compute.renew();
         assert_eq!(compute.run(|| 7).await, Ok(7));
+        assert_eq!(lock(&compute.idle).len(), 1);
         drop(end);
+    }
+
+    #[tokio::test]
+    async fn work_has_threads_of_its_own() {
+        let compute = Compute::new(2).unwrap();
+        let (told, hear) = std::sync::mpsc::channel::<()>();
+        // Each waits for the other, on all of its threads.
+        let one = compute.run(move || {
+            assert_eq!(rayon::current_num_threads(), 2);
+            hear.recv().is_ok()
+        });
+        let other = compute.run(move || told.send(()).is_ok());
+        assert_eq!(tokio::join!(one, other), (Ok(true), Ok(true)));
+        assert_eq!(lock(&compute.idle).len(), 2);
     }
 
     #[test]

@@ -185,7 +185,6 @@ impl Engine {
             }
             if start.elapsed() > self.settings.step_time + GRACE {
                 // It hears nothing: its threads are left to it.
-                self.compute.renew();
                 return self.stopped(&control);
             }
             if told.elapsed() > TELL && control.fraction() > last {
@@ -328,7 +327,7 @@ impl Engine {
     /// Commits a change with the tickets for the steps that it made ready, and tells of it.
     pub async fn commit(&self, mut tx: Transaction<'_, Sqlite>, changed: Changed) -> Result<(), StoreError> {
         // Workers that are at it go on by themselves.
-        let idle = self.settings.steps().saturating_sub(self.busy.load(Ordering::Relaxed));
+        let idle = self.settings.threads.saturating_sub(self.busy.load(Ordering::Relaxed));
         queue::push(&mut tx, changed.ready.min(idle)).await?;
         tx.commit().await?;
         let dropped = changed.dropped.clone();
@@ -360,7 +359,7 @@ impl Engine {
         if !changed.ended.is_empty() {
             self.finished.send_modify(|count| *count += changed.ended.len() as u64);
         }
-        for _ in 0..changed.ready.min(self.settings.steps()) {
+        for _ in 0..changed.ready.min(self.settings.threads) {
             self.wake.notify_one();
         }
     }

@@ -1,16 +1,18 @@
 use std::time::Duration;
 
 use sqlx::sqlite::SqliteConnection;
+use sqlx::{Sqlite, Transaction};
 
 use super::clock::now;
 use super::error::JobError;
 use super::event::EventKind;
 use super::graph::Changed;
 use super::job_id::{JobId, OfKind};
+use super::jobs::Jobs;
 use super::record::{RECORD, add_event, json, priority_number};
 use super::registration::TemplateChoice;
 use super::stage::JobStage;
-use super::state::{Priority, Status};
+use super::state::{Job, Priority, Status};
 use super::store_error::StoreError;
 
 /// A job that is asked for, of any kind, its files looked at and its settings complete.
@@ -35,7 +37,7 @@ impl<K: OfKind> NewJob<'_, K> {
     ///
     /// # Errors
     /// [`StoreError`].
-    pub async fn insert(
+    async fn insert(
         &self,
         tx: &mut SqliteConnection,
         keep: Option<Duration>,
@@ -76,15 +78,35 @@ impl<K: OfKind> NewJob<'_, K> {
     }
 }
 
+/// What came of asking for a job.
+pub(super) enum Begun<K> {
+    /// It was asked for before, with the same key.
+    Known(Job<K>),
+    /// It is kept when the transaction is committed, with its steps; its place among all jobs, and what changes.
+    New(Transaction<'static, Sqlite>, i64, Changed),
+}
+
+impl Jobs {
+    /// Begins to keep a job.
+    ///
+    /// # Errors
+    /// [`JobError::TooMany`] if its owner has too many open; [`JobError::Store`].
+    pub(super) async fn begin<K: OfKind>(&self, job: &NewJob<'_, K>) -> Result<Begun<K>, JobError> {
+        let settings = &self.engine.settings;
+        let mut changed = Changed::default();
+        let mut tx = self.engine.database.begin_write().await?;
+        check_room(&mut tx, job.owner, settings.jobs_per_owner).await?;
+        if let Some(sequence) = job.insert(&mut tx, settings.keep, &mut changed).await? {
+            return Ok(Begun::New(tx, sequence, changed));
+        }
+        tx.rollback().await?;
+        let known = self.known(job.dedupe_key).await?;
+        known.map(Begun::Known).ok_or_else(|| JobError::NotFound(K::KIND.to_string()))
+    }
+}
+
 /// Whether an owner may have one more open.
-///
-/// # Errors
-/// [`JobError::TooMany`].
-pub(super) async fn check_room(
-    tx: &mut SqliteConnection,
-    owner: Option<&str>,
-    most: usize,
-) -> Result<(), JobError> {
+async fn check_room(tx: &mut SqliteConnection, owner: Option<&str>, most: usize) -> Result<(), JobError> {
     let open = "SELECT count(*) FROM job WHERE status IN ('queued', 'running') AND owner IS ?";
     let open: i64 = sqlx::query_scalar(open).bind(owner).fetch_one(tx).await?;
     if open as usize >= most {

@@ -67,7 +67,7 @@ pub(super) async fn reconcile(engine: &Engine) -> Result<(), StoreError> {
         FROM step WHERE state IN ('ready', 'running')";
     let (ready, running): (i64, i64) = sqlx::query_as(open).fetch_one(engine.database.reader()).await?;
     let known = engine.running();
-    if running <= known.len() as i64 && (ready == 0 || known.len() >= engine.settings.steps()) {
+    if running <= known.len() as i64 && (ready == 0 || known.len() >= engine.settings.threads) {
         return Ok(());
     }
     let mut tx = engine.database.begin_write().await?;
@@ -78,7 +78,7 @@ pub(super) async fn reconcile(engine: &Engine) -> Result<(), StoreError> {
     let waiting = "SELECT count(*) FROM Jobs WHERE status = 'Pending'";
     let waiting: i64 = sqlx::query_scalar(waiting).fetch_one(&mut *tx).await?;
     if waiting == 0 {
-        push(&mut tx, engine.settings.steps()).await?;
+        push(&mut tx, engine.settings.threads).await?;
     }
     tx.commit().await?;
     engine.wake.notify_one();
@@ -115,7 +115,7 @@ pub(super) async fn work(engine: Arc<Engine>) {
             .backend(storage.poll_with_stream(signs))
             .data(engine.clone())
             .catch_panic()
-            .concurrency(engine.settings.steps())
+            .concurrency(engine.settings.threads)
             .build(take)
     });
     let monitor = monitor.should_restart(|_, error| {

@@ -7,7 +7,7 @@ use crate::render::AdapterChoice;
 /// How jobs are worked on, and their limits.
 #[derive(Debug, Clone)]
 pub struct JobSettings {
-    /// Threads that compute.
+    /// Steps that run at the same time; each computes on as many threads, but four at most.
     pub threads: usize,
     /// Scans of one job.
     pub scans: usize,
@@ -31,13 +31,6 @@ pub struct JobSettings {
     pub capture_limits: CaptureLimits,
     /// What inverse renderings are drawn with.
     pub adapter: AdapterChoice,
-}
-
-impl JobSettings {
-    /// Steps that run at the same time: of several threads none has nothing to do while a step is stored.
-    pub fn steps(&self) -> usize {
-        if self.threads > 1 { self.threads + 1 } else { 1 }
-    }
 }
 
 impl Default for JobSettings {

@@ -2,10 +2,9 @@
 
 use super::engine::Engine;
 use super::error::JobError;
-use super::graph::Changed;
 use super::job_id::{JobId, OfKind};
 use super::jobs::Jobs;
-use super::new_job::{NewJob, check_room};
+use super::new_job::{Begun, NewJob};
 use super::record::{broken, json};
 use super::registration::{NewMember, NewRegistration, Registration, RegistrationId, TemplateChoice};
 use super::result_file::ResultFile;
@@ -46,13 +45,9 @@ impl Jobs {
             webhook: new.webhook.as_deref(),
             stages: &JobStage::FIRST,
         };
-        let mut changed = Changed::default();
-        let mut tx = self.engine.database.begin_write().await?;
-        check_room(&mut tx, job.owner, own.jobs_per_owner).await?;
-        let Some(sequence) = job.insert(&mut tx, own.keep, &mut changed).await? else {
-            tx.rollback().await?;
-            let known = self.known(job.dedupe_key).await?;
-            return known.ok_or_else(|| JobError::NotFound("registration".to_owned()));
+        let (mut tx, sequence, mut changed) = match self.begin(&job).await? {
+            Begun::Known(job) => return Ok(job),
+            Begun::New(tx, sequence, changed) => (tx, sequence, changed),
         };
         for (place, member) in (0..).zip(&members) {
             insert_member(&mut tx, sequence, place, member).await?;

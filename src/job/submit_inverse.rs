@@ -3,10 +3,9 @@
 use super::capture::{CaptureFiles, CaptureParts};
 use super::engine::Engine;
 use super::error::JobError;
-use super::graph::Changed;
 use super::inverse_rendering::{InverseRendering, InverseRenderingId, NewInverseRendering};
 use super::jobs::Jobs;
-use super::new_job::{NewJob, check_room};
+use super::new_job::{Begun, NewJob};
 use super::record::{ALL, json};
 use super::registration::TemplateChoice;
 use super::stage::JobStage;
@@ -33,7 +32,6 @@ impl Jobs {
         self.renderer().await?;
         let (parts, settings) = (new.capture.parts(), settings(&new)?);
         self.look_at(&parts).await?;
-        let own = &self.engine.settings;
         let id = InverseRenderingId::new();
         let job = NewJob {
             id: &id,
@@ -47,13 +45,9 @@ impl Jobs {
             webhook: new.webhook.as_deref(),
             stages: &[JobStage::Invert],
         };
-        let mut changed = Changed::default();
-        let mut tx = self.engine.database.begin_write().await?;
-        check_room(&mut tx, job.owner, own.jobs_per_owner).await?;
-        let Some(sequence) = job.insert(&mut tx, own.keep, &mut changed).await? else {
-            tx.rollback().await?;
-            let known = self.known(job.dedupe_key).await?;
-            return known.ok_or_else(|| JobError::NotFound("inverse rendering".to_owned()));
+        let (mut tx, sequence, mut changed) = match self.begin(&job).await? {
+            Begun::Known(job) => return Ok(job),
+            Begun::New(tx, sequence, changed) => (tx, sequence, changed),
         };
         let step = "INSERT INTO step (job, stage, place, state) VALUES (?, 0, ?, 'ready')";
         sqlx::query(step).bind(sequence).bind(ALL).execute(&mut *tx).await?;

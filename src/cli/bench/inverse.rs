@@ -62,6 +62,12 @@ enum Way {
     BiLaplacian,
 }
 
+impl Way {
+    fn name(self) -> String {
+        format!("{self:?}").to_lowercase()
+    }
+}
+
 impl Inverse {
     /// Whether it is asked for.
     pub fn is_asked(&self) -> bool {
@@ -74,13 +80,16 @@ impl Inverse {
             "| scene | vertices | way | chamfer | normal | top 5 % distance | top 5 % normal | overlap | MAE | s |"
         );
         println!("|---|---|---|---|---|---|---|---|---|---|");
+        let mut rows = Vec::new();
         for (name, mesh) in scenes(inputs)? {
-            self.scene(&name, &mesh)?;
+            rows.extend(self.scene(&name, &mesh)?);
         }
+        [Way::On, Way::Default].into_iter().for_each(|way| compare(&rows, way));
         Ok(())
     }
 
-    fn scene(&self, name: &str, mesh: &TriangleMesh) -> anyhow::Result<()> {
+    fn scene(&self, name: &str, mesh: &TriangleMesh) -> anyhow::Result<Vec<Row>> {
+        let mut rows = Vec::new();
         let mut renderer = open(&self.adapter.parse::<AdapterChoice>()?)?;
         let taken = CaptureSettings { views: self.views, size: self.size, shown: Shown::Shaded, samples: 4 };
         let views = Views::new(capture(mesh, &taken, &mut *renderer, &())?, What::Shaded)?;
@@ -93,7 +102,7 @@ impl Inverse {
                 let figures = surface_figures(mesh, &found.mesh, false);
                 println!(
                     "| {name} | {vertices} | {} | {:.3e} | {:.4} | {:.3e} | {:.4} | {:.4} | {:.5} | {seconds:.0} |",
-                    format!("{way:?}").to_lowercase(),
+                    way.name(),
                     figures.chamfer,
                     figures.normal,
                     figures.top5[0],
@@ -101,9 +110,11 @@ impl Inverse {
                     found.report.overlap,
                     found.report.mae,
                 );
+                let figures = [figures.chamfer, figures.normal, figures.top5[0], figures.top5[1]];
+                rows.push(Row { way, figures, seconds });
             }
         }
-        Ok(())
+        Ok(rows)
     }
 
     fn settings(&self, way: Way, vertices: usize) -> anyhow::Result<InvertSettings> {
@@ -128,6 +139,34 @@ impl Inverse {
         }
         Ok(settings)
     }
+}
+
+/// What was measured of one inversion.
+struct Row {
+    way: Way,
+    figures: [f64; 4],
+    seconds: f64,
+}
+
+/// How many times as large the figures of a way are as those of the `paper` preset without density adaptation, which comes
+/// in the same order of scenes: geometric means.
+fn compare(rows: &[Row], way: Way) {
+    let of = |way: Way| rows.iter().filter(move |row| row.way == way);
+    let pairs: Vec<(&Row, &Row)> = of(way).zip(of(Way::Off)).collect();
+    if pairs.is_empty() || of(way).count() != of(Way::Off).count() {
+        return;
+    }
+    let mean = |ratio: &dyn Fn(&Row, &Row) -> f64| {
+        (pairs.iter().map(|(one, other)| ratio(one, other).ln()).sum::<f64>() / pairs.len() as f64).exp()
+    };
+    let [chamfer, normal, distance, top_normal] =
+        [0, 1, 2, 3].map(|k| mean(&|one: &Row, other: &Row| one.figures[k] / other.figures[k]));
+    let seconds = mean(&|one, other| one.seconds / other.seconds);
+    println!(
+        "| {} scenes | | {} / off | {chamfer:.3} | {normal:.3} | {distance:.3} | {top_normal:.3} | | | {seconds:.2} |",
+        pairs.len(),
+        way.name(),
+    );
 }
 
 fn scenes(inputs: &[PathBuf]) -> anyhow::Result<Vec<(String, TriangleMesh)>> {

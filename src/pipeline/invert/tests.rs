@@ -22,8 +22,9 @@ fn hare() -> TriangleMesh {
 /// Few iterations on a small sphere.
 fn quick() -> InvertSettings {
     let mut settings = InvertSettings::preset(InvertPreset::Default, 642).unwrap();
+    settings.levels.truncate(1);
     settings.levels[0].size = 64;
-    settings.levels[0].iterations = 60;
+    settings.levels[0].iterations = 100;
     settings.hull_cells = 32;
     settings
 }
@@ -47,6 +48,53 @@ fn a_shape_is_found_again_wherever_it_stands_and_however_large_it_is() {
             assert!(found.report.mae < 0.05 && found.report.light.is_some(), "{}", found.report.mae);
         }
     }
+}
+
+#[test]
+fn a_finer_sphere_and_larger_pictures_come_closer() {
+    let mesh = hare();
+    let photographs = pictures(&mesh, 8, 96, Shown::WorldNormal);
+    let mut settings = InvertSettings::preset(InvertPreset::Default, 2562).unwrap();
+    settings.levels[0].level = 3;
+    for (level, (size, iterations)) in settings.levels.iter_mut().zip([(48, 100), (96, 100)]) {
+        (level.size, level.iterations) = (size, iterations);
+    }
+    let chamfer = |found: &Inversion| crate::evaluate::surface_figures(&mesh, &found.mesh, false).chamfer;
+    let fine = inverted(photographs.clone(), &settings).unwrap();
+    assert_eq!((fine.mesh.positions().len(), fine.sphere.len()), (2562, 2562));
+    settings.levels.truncate(1);
+    settings.vertices = 642;
+    let (coarse, fine) = (chamfer(&inverted(photographs, &settings).unwrap()), chamfer(&fine));
+    assert!(fine < coarse, "{fine} is no better than {coarse}");
+}
+
+#[test]
+fn colours_of_vertices_are_found() {
+    let shaded = pictures(&hare(), 8, 64, Shown::Shaded);
+    let normals = pictures(&hare(), 8, 64, Shown::WorldNormal);
+    // What faces up is red.
+    let mut painted = shaded;
+    for (photograph, normals) in painted.iter_mut().zip(&normals) {
+        for (pixel, normal) in photograph.pixels.values.iter_mut().zip(&normals.pixels.values) {
+            if normal[3] > 0.0 && normal[1] > 0.5 * normal[3] {
+                (pixel[1], pixel[2]) = (0.3 * pixel[1], 0.3 * pixel[2]);
+            }
+        }
+    }
+    let light = crate::pipeline::studio_light().0.to_vec();
+    let mut settings = InvertSettings { albedo: Albedo::Vertex, what: What::Shaded, light, ..quick() };
+    settings.levels[0].iterations = 300;
+    let found = inverted(painted, &settings).unwrap();
+    let topology = crate::mesh::Topology::new(found.mesh.positions().len(), found.mesh.triangles());
+    let positions: Vec<Vec3A> = found.mesh.positions().iter().map(|p| p.as_vec3a()).collect();
+    let vertices = Normals::new(&topology, &positions).vertices;
+    let redness = |up: fn(f32) -> bool| {
+        let own = found.albedo.iter().flatten().zip(&vertices).filter(|(_, normal)| up(normal.y));
+        let (red, green) = own.fold((0.0, 0.0), |sum, (colour, _)| (sum.0 + colour[0], sum.1 + colour[1]));
+        red / green
+    };
+    let (above, below) = (redness(|y| y > 0.3), redness(|y| y < -0.3));
+    assert!(above > 1.5 * below, "{above} above, {below} below");
 }
 
 #[test]
