@@ -101,7 +101,7 @@ pub struct RegistrationLimits {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct WorkConfig {
-    /// Threads that compute; 0 for one each processor.
+    /// Steps that are worked on at the same time, each on as many threads but four at most; 0 for one each processor.
     pub threads: usize,
     /// Bytes of scans that are kept ready between steps.
     pub cache_bytes: usize,
