@@ -333,7 +333,7 @@ async fn a_small_registration_is_not_starved_by_a_large_one_and_priority_goes_fi
     assert_eq!(service.ended(&small).await.status, Status::Succeeded);
     let [large_then, low_then] = [&large, &low].map(|one| service.jobs.get(&one.id));
     let (large_then, low_then) = (large_then.await.unwrap(), low_then.await.unwrap());
-    assert_eq!(large_then.status, Status::Running);
+    assert!(large_then.status == Status::Running && large_then.progress < 0.6, "{}", large_then.progress);
     assert_eq!((low_then.status, low_then.queue_position), (Status::Queued, Some(0)));
     assert_eq!(service.ended(&large).await.status, Status::Succeeded);
     assert_ne!(service.jobs.get(&low.id).await.unwrap().status, Status::Succeeded);
