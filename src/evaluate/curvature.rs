@@ -133,7 +133,7 @@ fn rows(count: usize, mut entries: Vec<([u32; 2], f64)>) -> Rows<(u32, f64)> {
         same
     });
     let pairs: Vec<_> = entries.into_iter().map(|([row, column], value)| (row, (column, value))).collect();
-    Rows::from_pairs(count, &pairs)
+    Rows::from_pairs(count, pairs.iter().copied())
 }
 
 /// The cotangents of a triangle's angles and its area; zeros if it is degenerate.

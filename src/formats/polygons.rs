@@ -84,9 +84,9 @@ impl Polygons {
             return false;
         }
         if self.all_triangles() && corners > 3 {
-            self.ends.extend((0..self.closed).step_by(3).map(|start| start + 3));
-            self.ends.push(self.corners.len());
-        } else if !self.all_triangles() {
+            self.ends.extend((3..=self.closed).step_by(3));
+        }
+        if !self.all_triangles() || corners > 3 {
             self.ends.push(self.corners.len());
         }
         self.closed = self.corners.len();
@@ -104,9 +104,11 @@ impl Polygons {
     }
 
     fn ranges(&self) -> impl Iterator<Item = Range<usize>> {
-        let triangles =
-            (0..if self.all_triangles() { self.closed / 3 } else { 0 }).map(|at| 3 * at..3 * at + 3);
-        triangles.chain(self.ends.iter().scan(0, |start, &end| Some(std::mem::replace(start, end)..end)))
+        let triangles = if self.all_triangles() { self.closed } else { 0 };
+        (0..triangles)
+            .step_by(3)
+            .map(|start| start..start + 3)
+            .chain(self.ends.iter().scan(0, |start, &end| Some(std::mem::replace(start, end)..end)))
     }
 }
 

@@ -9,20 +9,20 @@ pub struct Rows<T> {
 
 impl<T: Copy> Rows<T> {
     /// Collects `(row, item)` pairs into `rows` lists; within a row the pairs' order is kept.
-    pub fn from_pairs(rows: usize, pairs: &[(u32, T)]) -> Self {
+    pub fn from_pairs(rows: usize, pairs: impl Iterator<Item = (u32, T)> + Clone) -> Self {
         let mut starts = vec![0u32; rows + 1];
-        for (row, _) in pairs {
-            starts[*row as usize + 1] += 1;
+        for (row, _) in pairs.clone() {
+            starts[row as usize + 1] += 1;
         }
         for row in 0..rows {
             starts[row + 1] += starts[row];
         }
-        let Some(&(_, filler)) = pairs.first() else {
+        let Some((_, filler)) = pairs.clone().next() else {
             return Self { starts, items: Vec::new() };
         };
-        let mut items = vec![filler; pairs.len()];
+        let mut items = vec![filler; starts[rows] as usize];
         let mut next = starts.clone();
-        for &(row, item) in pairs {
+        for (row, item) in pairs {
             items[next[row as usize] as usize] = item;
             next[row as usize] += 1;
         }
@@ -81,14 +81,14 @@ impl Topology {
         // Edges are sorted: with smaller neighbours before larger ones, rows come out ascending.
         let smaller = edges.iter().map(|&[a, b]| (b, a));
         let pairs: Vec<(u32, u32)> = smaller.chain(edges.iter().map(|&[a, b]| (a, b))).collect();
-        let neighbours = Rows::from_pairs(vertices, &pairs);
+        let neighbours = Rows::from_pairs(vertices, pairs.iter().copied());
         let mut corners = Vec::with_capacity(3 * triangles.len());
         for (t, corner) in triangles.iter().enumerate() {
             for k in 0..3 {
                 corners.push((corner[k], [t as u32, corner[(k + 1) % 3], corner[(k + 2) % 3]]));
             }
         }
-        let fans = Rows::from_pairs(vertices, &corners);
+        let fans = Rows::from_pairs(vertices, corners.iter().copied());
         Self { triangles: triangles.to_vec(), edges, edge_triangles, neighbours, fans, on_rim }
     }
 
@@ -123,7 +123,7 @@ fn edges_of(vertices: usize, triangles: &[[u32; 3]]) -> (Vec<[u32; 2]>, Vec<[u32
         }
     }
     // By the smaller vertex first: many small sorts take a fraction of a large one.
-    let mut sides = Rows::from_pairs(vertices, &sides);
+    let mut sides = Rows::from_pairs(vertices, sides.iter().copied());
     let mut edges: Vec<[u32; 2]> = Vec::with_capacity(sides.items.len() / 2);
     let mut edge_triangles: Vec<[u32; 2]> = Vec::with_capacity(sides.items.len() / 2);
     for smaller in 0..vertices {

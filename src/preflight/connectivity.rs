@@ -4,7 +4,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use crate::mesh::{TriangleMesh, components};
+use crate::mesh::{Rows, TriangleMesh, components};
 
 /// How a surface's triangles hang together.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -52,7 +52,7 @@ impl Connectivity {
     pub fn of(mesh: &TriangleMesh) -> Self {
         const VERTICES: usize = 4096;
         let (triangles, vertices) = (mesh.triangles(), mesh.positions().len());
-        let corners = CornersAt::new(vertices, triangles);
+        let corners = corners_at(vertices, triangles);
         let starts: Vec<usize> = (0..vertices).step_by(VERTICES).collect();
         let part = |&start: &usize| Fans::of(triangles, &corners, start..(start + VERTICES).min(vertices));
         let parts: Vec<Fans> = starts.par_iter().map(part).collect();
@@ -139,10 +139,10 @@ struct Spoke {
 
 impl Fans {
     /// Every edge counts at its smaller vertex.
-    fn of(triangles: &[[u32; 3]], corners: &CornersAt, vertices: Range<usize>) -> Self {
+    fn of(triangles: &[[u32; 3]], corners: &Rows<u32>, vertices: Range<usize>) -> Self {
         let (mut found, mut spokes, mut sets) = (Self::default(), Vec::new(), Sets::default());
         for vertex in vertices {
-            let own = corners.of(vertex);
+            let own = corners.row(vertex);
             spokes.clear();
             for (place, &corner) in own.iter().enumerate() {
                 let [a, b, c] = triangles[corner as usize / 3];
@@ -179,34 +179,8 @@ impl Fans {
 }
 
 /// The corners of triangles, `3 f + k` the k-th of triangle f, by their vertices.
-struct CornersAt {
-    /// Where the corners of each vertex begin, and the last end `[N + 1]`.
-    starts: Vec<u32>,
-    corners: Vec<u32>,
-}
-
-impl CornersAt {
-    fn new(vertices: usize, triangles: &[[u32; 3]]) -> Self {
-        let mut starts = vec![0; vertices + 1];
-        triangles.iter().flatten().for_each(|&vertex| starts[vertex as usize] += 1);
-        let mut end = 0;
-        for start in &mut starts {
-            end += *start;
-            *start = end;
-        }
-        // Filled from behind, so that each start ends where it belongs and the corners ascend.
-        let mut corners = vec![0; end as usize];
-        for (corner, &vertex) in triangles.as_flattened().iter().enumerate().rev() {
-            let start = &mut starts[vertex as usize];
-            *start -= 1;
-            corners[*start as usize] = corner as u32;
-        }
-        Self { starts, corners }
-    }
-
-    fn of(&self, vertex: usize) -> &[u32] {
-        &self.corners[self.starts[vertex] as usize..self.starts[vertex + 1] as usize]
-    }
+fn corners_at(vertices: usize, triangles: &[[u32; 3]]) -> Rows<u32> {
+    Rows::from_pairs(vertices, triangles.as_flattened().iter().copied().zip(0..))
 }
 
 /// Directed edges `[E, 2]`, chained end to end as far as they go; against their direction only where there is no other

@@ -44,7 +44,7 @@ impl Connectivity {
 /// For each vertex the places at which it stands in a flattened list.
 fn rows<const K: usize>(vertices: usize, list: &[[u32; K]]) -> Rows<u32> {
     let pairs: Vec<(u32, u32)> = list.as_flattened().iter().copied().zip(0..).collect();
-    Rows::from_pairs(vertices, &pairs)
+    Rows::from_pairs(vertices, pairs.iter().copied())
 }
 
 #[cfg(test)]
