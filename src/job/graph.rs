@@ -18,7 +18,7 @@ use super::work::Decided;
 use crate::formats::Sha256;
 use crate::pipeline::Verdict;
 
-/// Seconds that a step is taken to need until it is known.
+/// Seconds that a step which runs is taken to need.
 const ASSUMED: f64 = 1.0;
 
 /// A step that ended the program so often runs alone, so that it harms no other and no other is taken for it.
@@ -85,10 +85,13 @@ pub(super) async fn claim(
     let whose = "SELECT r.sequence, r.id, r.status, r.stage, r.stages FROM job r
         WHERE r.status IN ('queued', 'running')
             AND EXISTS (SELECT 1 FROM step s WHERE s.job = r.sequence AND s.state = 'ready' AND s.crashes < ?)
-        ORDER BY r.priority DESC, r.turn, r.sequence LIMIT 1";
+        ORDER BY r.priority DESC,
+            r.turn + ? * (SELECT count(*) FROM step s WHERE s.job = r.sequence AND s.state = 'running'), r.sequence
+        LIMIT 1";
     // Suspects have their turn when nothing else runs.
     let below = if others_run { SUSPECT } else { i64::MAX };
-    let Some(row) = sqlx::query(whose).bind(below).fetch_optional(&mut *tx).await? else { return Ok(None) };
+    let whose = sqlx::query(whose).bind(below).bind(ASSUMED);
+    let Some(row) = whose.fetch_optional(&mut *tx).await? else { return Ok(None) };
     let job: i64 = row.try_get("sequence")?;
     let next = "SELECT id, stage, place, crashes FROM step
         WHERE job = ? AND state = 'ready' AND crashes < ? ORDER BY crashes, stage DESC, place LIMIT 1";
@@ -107,9 +110,9 @@ pub(super) async fn claim(
         let event = EventKind::Stage { stage: name.name().to_owned() };
         changed.events.push(add_event(tx, job, event).await?);
     }
-    let begin = "UPDATE job SET status = 'running', started_at = coalesce(started_at, ?1), turn = turn + ?2,
-        stage = max(coalesce(stage, 0), ?3) WHERE sequence = ?4";
-    sqlx::query(begin).bind(now()).bind(ASSUMED).bind(stage).bind(job).execute(&mut *tx).await?;
+    let begin = "UPDATE job SET status = 'running', started_at = coalesce(started_at, ?1),
+        stage = max(coalesce(stage, 0), ?2) WHERE sequence = ?3";
+    sqlx::query(begin).bind(now()).bind(stage).bind(job).execute(&mut *tx).await?;
     let child = "UPDATE child SET status = 'running', started_at = coalesce(started_at, ?1), stage = ?2
         WHERE job = ?3 AND place = ?4";
     sqlx::query(child).bind(now()).bind(stage).bind(job).bind(place).execute(&mut *tx).await?;
@@ -248,8 +251,8 @@ async fn end_step(
         WHERE id = ? AND runs = ? AND state = 'running'";
     let query = sqlx::query(query).bind(state).bind(output.map(|digest| digest.to_string())).bind(seconds);
     let ended = query.bind(claim.step).bind(claim.run).execute(&mut *tx).await?.rows_affected() == 1;
-    let charge = "UPDATE job SET seconds = seconds + ?1, turn = turn + ?1 - ?2 WHERE sequence = ?3";
-    sqlx::query(charge).bind(seconds).bind(ASSUMED).bind(claim.job).execute(tx).await?;
+    let charge = "UPDATE job SET seconds = seconds + ?1, turn = turn + ?1 WHERE sequence = ?2";
+    sqlx::query(charge).bind(seconds).bind(claim.job).execute(tx).await?;
     Ok(ended)
 }
 

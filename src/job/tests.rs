@@ -7,16 +7,19 @@ use serde_json::{Value, json};
 
 use super::blobs::Blobs;
 use super::event::EventKind;
+use super::graph::{self, Changed, Claim, Done};
 use super::jobs::{Jobs, Page};
 use super::registration::{NewMember, NewRegistration, Registering, Registration, TemplateChoice};
 use super::result_file::ResultFile;
 use super::scan::{MeshKind, NewScan, ScanId, ScanLimits, Scans};
+use super::stage::JobStage;
 use super::state::{Priority, Status};
 use super::template::Templates;
-use super::{DataFolder, Database, JobError, JobSettings};
+use super::work::{Decided, Judgement};
+use super::{DataFolder, Database, JobError, JobSettings, queue};
 use crate::demo::{SculptedHead, Sculptor, Settings as Sculpture};
 use crate::formats::{Sha256, landmarks_json, ply_bytes};
-use crate::pipeline::{Outputs, Package, Settings, Subject, precheck, register, register_to};
+use crate::pipeline::{Outputs, Package, Settings, Subject, Verdict, precheck, register, register_to};
 
 /// A service's parts beneath its HTTP.
 struct Service {
@@ -82,6 +85,38 @@ impl Service {
     async fn file(&self, registration: &Registration, file: ResultFile) -> Vec<u8> {
         let kept = self.jobs.result(&registration.id, &file).await.unwrap();
         self.blobs.read(kept.digest).await.unwrap().to_vec()
+    }
+
+    /// Has nothing run by itself any more, and forgets how long what ran until now has taken.
+    async fn take_over(&self) {
+        self.jobs.close().await;
+        queue::recover(&self.jobs.engine).await.unwrap();
+        sqlx::query("UPDATE job SET turn = 0").execute(self.database.writer()).await.unwrap();
+    }
+
+    /// Takes on the next step, by hand.
+    async fn claim(&self) -> Claim {
+        let mut tx = self.database.begin_write().await.unwrap();
+        let claim = graph::claim(&mut tx, &mut Changed::default(), false).await.unwrap().unwrap();
+        tx.commit().await.unwrap();
+        claim
+    }
+
+    /// Ends a step as if it had done its work in so many seconds, each scan being inspected and packaged alone.
+    async fn finish(&self, claim: &Claim, seconds: f64) {
+        let decided = match claim.stage() {
+            JobStage::Plan => {
+                let course = [JobStage::Inspect, JobStage::Plan, JobStage::Package, JobStage::Set];
+                Decided::Course(course.to_vec(), Vec::new())
+            }
+            JobStage::Package => Decided::Judgement(Judgement { verdict: Verdict::Pass, residual: None }),
+            _ => Decided::Nothing,
+        };
+        let done = Done { output: None, files: Vec::new(), decided, seconds };
+        let mut changed = Changed::default();
+        let mut tx = self.database.begin_write().await.unwrap();
+        assert!(graph::finish(&mut tx, claim, done, &mut changed).await.unwrap());
+        self.jobs.engine.commit(tx, changed).await.unwrap();
     }
 
     async fn count(&self, query: &'static str) -> i64 {
@@ -342,6 +377,36 @@ async fn a_small_registration_is_not_starved_by_a_large_one_and_priority_goes_fi
     assert_eq!(latest.iter().map(|one| &one.id).collect::<Vec<_>>(), [&low.id, &small.id]);
     let before = Page { limit: 9, before: Some(small.id.clone()), ..Page::default() };
     assert_eq!(service.jobs.list(before).await.unwrap().len(), 1);
+}
+
+#[tokio::test]
+async fn registrations_share_the_time_whatever_their_steps_take() {
+    let service = Service::start(JobSettings { threads: 1, ..settings() }).await;
+    let members = service.upload_all(&heads(13)).await;
+    let large = service.jobs.submit(asked(members[..12].to_vec())).await.unwrap();
+    let small = service.jobs.submit(asked(members[12..].to_vec())).await.unwrap();
+    service.take_over().await;
+    let (mut of_large, mut of_small) = (0.0, 0.0);
+    while service.jobs.get(&small.id).await.unwrap().status != Status::Succeeded {
+        let claim = service.claim().await;
+        let (spent, seconds) =
+            if claim.id == small.id.as_str() { (&mut of_small, 1.0) } else { (&mut of_large, 3.0) };
+        *spent += seconds;
+        service.finish(&claim, seconds).await;
+        assert!(f64::abs(of_large - of_small) <= 3.0, "{of_large} s to {of_small} s");
+    }
+    assert_eq!(service.jobs.get(&large.id).await.unwrap().status, Status::Running);
+    // One that is asked for while a step runs begins where the others stand.
+    let held = service.claim().await;
+    let late = service.jobs.submit(asked(members[12..].to_vec())).await.unwrap();
+    service.finish(&held, 0.1).await;
+    let next = service.claim().await;
+    assert_eq!(next.id, late.id.as_str());
+    service.finish(&next, 3.0).await;
+    while service.jobs.get(&large.id).await.unwrap().status != Status::Succeeded {
+        let claim = service.claim().await;
+        service.finish(&claim, 3.0).await;
+    }
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
