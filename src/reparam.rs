@@ -1,9 +1,11 @@
 //! Diffusion re-parameterization: u = (I + lambda L) p and the way back, equations (3) and (4). Layer 2.
 
+use std::sync::Arc;
+
 use glam::Vec3A;
 
 use crate::mesh::Topology;
-use crate::numeric::{Dissection, NotPositiveDefinite, SolveBuffer, SparseCholesky, SymmetricMatrix};
+use crate::numeric::{Elimination, NotPositiveDefinite, SolveBuffer, SparseCholesky, SymmetricMatrix};
 
 /// The change of variables between positions p and their diffusion parameters u, factored once per template and lambda.
 #[derive(Debug, Clone)]
@@ -19,11 +21,11 @@ impl Reparameterization {
     /// [`NotPositiveDefinite`] for a lambda so negative that the matrix is not.
     pub fn new(
         topology: &Topology,
-        dissection: &Dissection,
+        elimination: &Arc<Elimination>,
         lambda: f64,
     ) -> Result<Self, NotPositiveDefinite> {
         let matrix = SymmetricMatrix::diffusion(topology, lambda);
-        let cholesky = SparseCholesky::new(topology, &matrix, dissection)?;
+        let cholesky = SparseCholesky::new(elimination, &matrix)?;
         Ok(Self { matrix, cholesky })
     }
 
@@ -54,8 +56,8 @@ mod tests {
         let sphere = Icosphere::new(2);
         let topology = Topology::new(sphere.positions.len(), &sphere.triangles);
         let positions: Vec<Vec3A> = sphere.positions.iter().map(|p| p.as_vec3a()).collect();
-        let dissection = Dissection::new(&topology, &positions);
-        let reparameterization = Reparameterization::new(&topology, &dissection, 19.0).unwrap();
+        let elimination = Arc::new(Elimination::new(&topology, &positions));
+        let reparameterization = Reparameterization::new(&topology, &elimination, 19.0).unwrap();
         let mut buffer = SolveBuffer::default();
         let u = reparameterization.parameters(&topology, &positions);
         let mut back = u.clone();

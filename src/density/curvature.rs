@@ -1,8 +1,10 @@
+use std::sync::Arc;
+
 use glam::Vec3A;
 
 use super::mean;
 use crate::mesh::Topology;
-use crate::numeric::{Dissection, NotPositiveDefinite, SolveBuffer, SparseCholesky, SymmetricMatrix};
+use crate::numeric::{Elimination, NotPositiveDefinite, SolveBuffer, SparseCholesky, SymmetricMatrix};
 
 /// The adaptive density: edges shrink where the Laplacian of the present shape is longer than on average.
 ///
@@ -19,14 +21,14 @@ impl CurvatureDensity {
     ///
     /// # Errors
     /// [`NotPositiveDefinite`] if a vertex of the template has no neighbour.
-    pub fn new(topology: &Topology, dissection: &Dissection) -> Result<Self, NotPositiveDefinite> {
+    pub fn new(topology: &Topology, elimination: &Arc<Elimination>) -> Result<Self, NotPositiveDefinite> {
         const LAMBDA_S: f64 = 1.0;
         let valence = |i: usize| topology.neighbours.row(i).len() as f64;
         let matrix = SymmetricMatrix {
             diagonal: (0..topology.vertex_count()).map(|i| (1.0 + LAMBDA_S) * valence(i)).collect(),
             edges: vec![-LAMBDA_S; topology.edges.len()],
         };
-        Ok(Self { cholesky: SparseCholesky::new(topology, &matrix, dissection)? })
+        Ok(Self { cholesky: SparseCholesky::new(elimination, &matrix)? })
     }
 
     /// l'_k `[N]` of a shape with positions `[N, 3]` and mean edge lengths l `[N]`.
@@ -63,11 +65,11 @@ mod tests {
         let sphere = Icosphere::new(3);
         let topology = Topology::new(sphere.positions.len(), &sphere.triangles);
         let mut positions: Vec<Vec3A> = sphere.positions.iter().map(|p| p.as_vec3a()).collect();
-        let dissection = Dissection::new(&topology, &positions);
+        let elimination = Arc::new(Elimination::new(&topology, &positions));
         // So high that the mean is above the Laplacian of every vertex of the plain sphere.
         positions[100] *= 3.0;
         let lengths = mean_edge_lengths(&topology, &positions);
-        let density = CurvatureDensity::new(&topology, &dissection).unwrap();
+        let density = CurvatureDensity::new(&topology, &elimination).unwrap();
         let desired = density.lengths(&topology, &positions, &lengths, &mut SolveBuffer::default());
         assert!(desired[100] < 0.5 * lengths[100]);
         let far = (0..positions.len()).max_by(|&a, &b| {

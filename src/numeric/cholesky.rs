@@ -1,9 +1,11 @@
+use std::sync::Arc;
+
 use glam::Vec3A;
-use nalgebra_sparse::factorization::CscCholesky;
 use nalgebra_sparse::{CooMatrix, CscMatrix};
 
-use super::Dissection;
-use super::supernodal::{ColumnFactor, SolveBuffer, SupernodalFactor};
+use super::elimination::Elimination;
+use super::factorization::factor;
+use super::supernodal::{SolveBuffer, solve};
 use crate::mesh::Topology;
 
 /// A symmetric matrix with the sparsity of a mesh: a value per vertex and one per edge.
@@ -34,6 +36,23 @@ impl SymmetricMatrix {
         }
         product
     }
+
+    /// The whole of it as a matrix of nalgebra's, vertex `order[i]` in row and column i.
+    pub fn in_order(&self, topology: &Topology, order: &[u32]) -> CscMatrix<f64> {
+        let mut place = vec![0; order.len()];
+        for (i, &v) in order.iter().enumerate() {
+            place[v as usize] = i;
+        }
+        let mut entries = CooMatrix::new(order.len(), order.len());
+        for (&at, &value) in place.iter().zip(&self.diagonal) {
+            entries.push(at, at, value);
+        }
+        for (&[a, b], &value) in topology.edges.iter().zip(&self.edges) {
+            entries.push(place[a as usize], place[b as usize], value);
+            entries.push(place[b as usize], place[a as usize], value);
+        }
+        CscMatrix::from(&entries)
+    }
 }
 
 /// The matrix has a direction in which it does not grow.
@@ -44,30 +63,26 @@ pub struct NotPositiveDefinite;
 /// A sparse Cholesky factorisation A = P^T L L^T P: made once, then solved for many right-hand sides.
 #[derive(Debug, Clone)]
 pub struct SparseCholesky {
-    order: Vec<u32>,
-    factor: SupernodalFactor,
+    elimination: Arc<Elimination>,
+    /// Of each part its blocks.
+    values: [Vec<f32>; 3],
 }
 
 impl SparseCholesky {
-    /// Factors `matrix` in the order of `dissection`, in double precision; solves run in single.
+    /// Factors `matrix`, in double precision; solves run in single.
     ///
     /// # Errors
     /// [`NotPositiveDefinite`] where the matrix is not.
     pub fn new(
-        topology: &Topology,
+        elimination: &Arc<Elimination>,
         matrix: &SymmetricMatrix,
-        dissection: &Dissection,
     ) -> Result<Self, NotPositiveDefinite> {
-        let permuted = permuted(topology, matrix, &dissection.order);
-        let l = CscCholesky::factor(&permuted).map_err(|_| NotPositiveDefinite)?.take_l();
-        let (starts, rows, values) = l.csc_data();
-        let columns = ColumnFactor { starts, rows, values };
-        Ok(Self { order: dissection.order.clone(), factor: SupernodalFactor::new(&columns, dissection) })
+        Ok(Self { elimination: elimination.clone(), values: factor(elimination, matrix)? })
     }
 
     /// Solves A x = b for three right-hand sides at once, in place `[N, 3]`. `buffer` keeps its memory between calls.
     pub fn solve(&self, b: &mut [Vec3A], buffer: &mut SolveBuffer) {
-        self.factor.solve(&self.order, b, buffer);
+        solve(&self.elimination, &self.values, b, buffer);
     }
 
     /// Solves A x = b for one right-hand side, in place `[N]`.
@@ -80,26 +95,10 @@ impl SparseCholesky {
     }
 }
 
-/// The matrix with its vertices renumbered by `order`.
-fn permuted(topology: &Topology, matrix: &SymmetricMatrix, order: &[u32]) -> CscMatrix<f64> {
-    let mut place = vec![0usize; order.len()];
-    for (i, &v) in order.iter().enumerate() {
-        place[v as usize] = i;
-    }
-    let mut entries = CooMatrix::new(order.len(), order.len());
-    for (v, &value) in matrix.diagonal.iter().enumerate() {
-        entries.push(place[v], place[v], value);
-    }
-    for (&[a, b], &value) in topology.edges.iter().zip(&matrix.edges) {
-        entries.push(place[a as usize], place[b as usize], value);
-        entries.push(place[b as usize], place[a as usize], value);
-    }
-    CscMatrix::from(&entries)
-}
-
 #[cfg(test)]
 mod tests {
     use nalgebra::{DMatrix, DVector};
+    use nalgebra_sparse::factorization::CscCholesky;
 
     use super::*;
     use crate::mesh::Icosphere;
@@ -110,8 +109,8 @@ mod tests {
         let topology = Topology::new(sphere.positions.len(), &sphere.triangles);
         let positions: Vec<Vec3A> = sphere.positions.iter().map(|p| p.as_vec3a()).collect();
         let matrix = SymmetricMatrix::diffusion(&topology, lambda);
-        let dissection = Dissection::new(&topology, &positions);
-        let cholesky = SparseCholesky::new(&topology, &matrix, &dissection).unwrap();
+        let elimination = Arc::new(Elimination::new(&topology, &positions));
+        let cholesky = SparseCholesky::new(&elimination, &matrix).unwrap();
         let mut random = Random::new(1);
         let x: Vec<Vec3A> = positions
             .iter()
@@ -160,8 +159,8 @@ mod tests {
             }
             let b = DMatrix::from_fn(n, 3, |_, _| random.signed());
             let wanted = dense.cholesky().unwrap().solve(&b);
-            let dissection = Dissection::new(&topology, &positions);
-            let cholesky = SparseCholesky::new(&topology, &matrix, &dissection).unwrap();
+            let elimination = Arc::new(Elimination::new(&topology, &positions));
+            let cholesky = SparseCholesky::new(&elimination, &matrix).unwrap();
             let row = |m: &DMatrix<f64>, i| Vec3A::from_array([0, 1, 2].map(|k| m[(i, k)] as f32));
             let mut x: Vec<Vec3A> = (0..n).map(|i| row(&b, i)).collect();
             cholesky.solve(&mut x, &mut SolveBuffer::default());
@@ -172,12 +171,34 @@ mod tests {
     }
 
     #[test]
+    fn agrees_with_the_library_on_a_large_mesh() {
+        let mut random = Random::new(3);
+        let sphere = Icosphere::new(4);
+        let positions: Vec<Vec3A> = sphere.positions.iter().map(|p| p.as_vec3a()).collect();
+        let topology = Topology::new(positions.len(), &sphere.triangles);
+        let matrix = random_matrix(&topology, &mut random);
+        let elimination = Arc::new(Elimination::new(&topology, &positions));
+        let order = &elimination.order;
+        let b = DMatrix::from_fn(order.len(), 3, |_, _| random.signed());
+        let library = CscCholesky::factor(&matrix.in_order(&topology, order)).unwrap();
+        let wanted = library.solve(&b);
+        let mut x = vec![Vec3A::ZERO; order.len()];
+        let row = |m: &DMatrix<f64>, i| Vec3A::from_array([0, 1, 2].map(|k| m[(i, k)] as f32));
+        order.iter().enumerate().for_each(|(i, &v)| x[v as usize] = row(&b, i));
+        SparseCholesky::new(&elimination, &matrix).unwrap().solve(&mut x, &mut SolveBuffer::default());
+        let size = wanted.abs().max() as f32;
+        let error = order.iter().enumerate().map(|(i, &v)| x[v as usize].distance(row(&wanted, i)));
+        let error = error.fold(0.0, f32::max);
+        assert!(error < 1e-5 * size, "{error} of {size}");
+    }
+
+    #[test]
     fn refuses_an_indefinite_matrix() {
         let sphere = Icosphere::new(0);
         let topology = Topology::new(12, &sphere.triangles);
         let positions: Vec<Vec3A> = sphere.positions.iter().map(|p| p.as_vec3a()).collect();
         let matrix = SymmetricMatrix { diagonal: vec![-1.0; 12], edges: vec![0.0; 30] };
-        let dissection = Dissection::new(&topology, &positions);
-        assert_eq!(SparseCholesky::new(&topology, &matrix, &dissection).err(), Some(NotPositiveDefinite));
+        let elimination = Arc::new(Elimination::new(&topology, &positions));
+        assert_eq!(SparseCholesky::new(&elimination, &matrix).err(), Some(NotPositiveDefinite));
     }
 }

@@ -3,6 +3,8 @@
 mod adam_uniform;
 mod cholesky;
 mod dissection;
+mod elimination;
+mod factorization;
 #[cfg(test)]
 pub mod finite_difference;
 mod kabsch;
@@ -11,7 +13,8 @@ mod supernodal;
 
 pub use adam_uniform::AdamUniform;
 pub use cholesky::{NotPositiveDefinite, SparseCholesky, SymmetricMatrix};
-pub use dissection::Dissection;
+use dissection::Dissection;
+pub use elimination::Elimination;
 pub use kabsch::{Similarity, weighted_rotation};
 pub use random::Random;
 pub use supernodal::SolveBuffer;

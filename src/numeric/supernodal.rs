@@ -1,29 +1,12 @@
-use std::ops::Range;
-
 use glam::Vec3A;
 use multiversion::multiversion;
 
-use super::Dissection;
-
-/// Rows handled at once: one AVX register, two SSE registers; fixed, so that sums do not depend on the processor.
-const LANES: usize = 8;
-
-/// A lower-triangular factor L by columns, row indices ascending, the diagonal first.
-pub struct ColumnFactor<'a> {
-    /// Where each column begins `[N + 1]`.
-    pub starts: &'a [usize],
-    /// Row index of each entry.
-    pub rows: &'a [usize],
-    /// Value of each entry.
-    pub values: &'a [f64],
-}
+use super::elimination::{Block, Elimination, LANES, Part};
 
 /// Memory for solves, kept from one to the next.
 #[derive(Debug, Clone, Default)]
 pub struct SolveBuffer {
-    first: PartBuffer,
-    second: PartBuffer,
-    top: PartBuffer,
+    parts: [PartBuffer; 3],
 }
 
 #[derive(Debug, Clone, Default)]
@@ -33,210 +16,58 @@ struct PartBuffer {
     dense: Vec<f32>,
 }
 
-/// L as dense blocks of columns that share their rows, stored as G = [D; B D], where D is the inverse of a block's
-/// triangle and B what lies below it: then a solve is matrix products only.
-#[derive(Debug, Clone)]
-pub struct SupernodalFactor {
-    first: Part,
-    second: Part,
-    top: Part,
-}
-
-/// The blocks of one half of the dissection, or of its separator.
-#[derive(Debug, Clone)]
-struct Part {
-    /// Places of the order that this part solves for.
-    own: Range<usize>,
-    /// Unknowns of the separator behind the own ones.
-    ext: usize,
-    blocks: Vec<Block>,
-    rows: Vec<u32>,
-    values: Vec<f32>,
-}
-
-#[derive(Debug, Clone, Copy)]
-struct Block {
-    column: u32,
-    width: u32,
-    /// Rows including the block's own, padded to a multiple of [`LANES`].
-    height: u32,
-    rows_start: u32,
-    values_start: u32,
-}
-
-/// Columns `column..column + width` and the rows below them that any of the columns touches.
-struct ColumnGroup {
-    column: usize,
-    width: usize,
-    below: Vec<usize>,
-}
-
-impl ColumnGroup {
-    /// Cost of a solve with this block, in units of one multiplied entry.
-    fn cost(width: usize, below: usize) -> f64 {
-        let height = (width + below).next_multiple_of(LANES);
-        6.0 * height as f64 + (width * height) as f64 + 40.0
+/// Solves L L^T x = b in place, b `[N, 3]` in the mesh's order, with the blocks that [`super::factorization`] leaves of
+/// each part; the two halves run in parallel.
+pub(super) fn solve(
+    elimination: &Elimination,
+    values: &[Vec<f32>; 3],
+    b: &mut [Vec3A],
+    buffer: &mut SolveBuffer,
+) {
+    let Elimination { order, parts } = elimination;
+    let SolveBuffer { parts: buffers } = buffer;
+    for (part, buffer) in parts.iter().zip(&mut *buffers) {
+        buffer.load(part, order, b);
     }
-}
-
-impl SupernodalFactor {
-    /// Packs the columns of a factor made in the order of `dissection`.
-    pub fn new(columns: &ColumnFactor, dissection: &Dissection) -> Self {
-        let [first, second, top] =
-            dissection.parts().map(|own| Part::new(columns, own, dissection.separator));
-        Self { first, second, top }
+    let [first, second, top] = buffers;
+    rayon::join(|| first.forward(&parts[0], &values[0]), || second.forward(&parts[1], &values[1]));
+    let ends = parts.each_ref().map(|part| part.own.len());
+    for k in 0..ends[2] {
+        top.x[k] += first.x[ends[0] + k] + second.x[ends[1] + k];
     }
-
-    /// Solves L L^T x = b in place, b `[N, 3]` in the mesh's order; the two halves run in parallel.
-    pub fn solve(&self, order: &[u32], b: &mut [Vec3A], buffer: &mut SolveBuffer) {
-        let SolveBuffer { first, second, top } = buffer;
-        self.first.load(order, b, first);
-        self.second.load(order, b, second);
-        self.top.load(order, b, top);
-        rayon::join(|| self.first.forward(first), || self.second.forward(second));
-        for k in 0..self.top.own.len() {
-            top.x[k] += first.x[self.first.own.len() + k] + second.x[self.second.own.len() + k];
-        }
-        self.top.forward(top);
-        self.top.backward(top);
-        for k in 0..self.top.own.len() {
-            first.x[self.first.own.len() + k] = top.x[k];
-            second.x[self.second.own.len() + k] = top.x[k];
-        }
-        rayon::join(|| self.first.backward(first), || self.second.backward(second));
-        self.first.store(order, b, first);
-        self.second.store(order, b, second);
-        self.top.store(order, b, top);
+    top.forward(&parts[2], &values[2]);
+    top.backward(&parts[2], &values[2]);
+    for k in 0..ends[2] {
+        first.x[ends[0] + k] = top.x[k];
+        second.x[ends[1] + k] = top.x[k];
     }
-}
-
-impl Part {
-    fn new(columns: &ColumnFactor, own: Range<usize>, separator: usize) -> Self {
-        let total = columns.starts.len() - 1;
-        let ext = if own.start == separator { 0 } else { total - separator };
-        let mut part =
-            Self { own: own.clone(), ext, blocks: Vec::new(), rows: Vec::new(), values: Vec::new() };
-        for group in column_groups(columns, own) {
-            part.push(columns, &group, separator);
-        }
-        part
-    }
-
-    /// Index of an unknown in the part's buffer.
-    fn local(&self, row: usize, separator: usize) -> usize {
-        if self.own.contains(&row) { row - self.own.start } else { self.own.len() + row - separator }
-    }
-
-    fn push(&mut self, columns: &ColumnFactor, group: &ColumnGroup, separator: usize) {
-        let (width, used) = (group.width, group.width + group.below.len());
-        let height = used.next_multiple_of(LANES);
-        self.blocks.push(Block {
-            column: (group.column - self.own.start) as u32,
-            width: width as u32,
-            height: height as u32,
-            rows_start: self.rows.len() as u32,
-            values_start: self.values.len() as u32,
-        });
-        let rows = (group.column..group.column + width).chain(group.below.iter().copied());
-        for row in rows {
-            self.rows.push(self.local(row, separator) as u32);
-        }
-        let padding = (self.own.len() + self.ext) as u32;
-        self.rows.extend(std::iter::repeat_n(padding, height - used));
-        self.values.extend(solved_block(&dense_block(columns, group, height), width, height));
-    }
-
-    fn load(&self, order: &[u32], b: &[Vec3A], buffer: &mut PartBuffer) {
-        let tallest = self.blocks.iter().map(|block| block.height).max().unwrap_or(0) as usize;
-        buffer.dense.resize(4 * tallest, 0.0);
-        buffer.x.clear();
-        buffer.x.extend(order[self.own.clone()].iter().map(|&v| b[v as usize]));
-        buffer.x.resize(self.own.len() + self.ext + 1, Vec3A::ZERO);
-    }
-
-    fn store(&self, order: &[u32], b: &mut [Vec3A], buffer: &PartBuffer) {
-        for (&v, &x) in order[self.own.clone()].iter().zip(&buffer.x) {
+    rayon::join(|| first.backward(&parts[0], &values[0]), || second.backward(&parts[1], &values[1]));
+    for (part, buffer) in parts.iter().zip(&*buffers) {
+        for (&v, &x) in order[part.own.clone()].iter().zip(&buffer.x) {
             b[v as usize] = x;
         }
     }
+}
 
-    fn forward(&self, buffer: &mut PartBuffer) {
-        forward(&self.blocks, &self.rows, &self.values, &mut buffer.x, &mut buffer.dense);
+impl PartBuffer {
+    fn load(&mut self, part: &Part, order: &[u32], b: &[Vec3A]) {
+        let tallest = part.blocks.iter().map(|block| block.height).max().unwrap_or(0) as usize;
+        self.dense.resize(4 * tallest, 0.0);
+        self.x.clear();
+        self.x.extend(order[part.own.clone()].iter().map(|&v| b[v as usize]));
+        self.x.resize(part.own.len() + part.ext + 1, Vec3A::ZERO);
     }
 
-    fn backward(&self, buffer: &mut PartBuffer) {
-        if let Some(padding) = buffer.x.last_mut() {
+    fn forward(&mut self, part: &Part, values: &[f32]) {
+        forward(&part.blocks, &part.rows, values, &mut self.x, &mut self.dense);
+    }
+
+    fn backward(&mut self, part: &Part, values: &[f32]) {
+        if let Some(padding) = self.x.last_mut() {
             *padding = Vec3A::ZERO;
         }
-        backward(&self.blocks, &self.rows, &self.values, &mut buffer.x, &mut buffer.dense);
+        backward(&part.blocks, &part.rows, values, &mut self.x, &mut self.dense);
     }
-}
-
-/// Columns with the same rows below, joined further where padding them to a common shape costs less than it saves.
-fn column_groups(columns: &ColumnFactor, own: Range<usize>) -> Vec<ColumnGroup> {
-    let mut groups: Vec<ColumnGroup> = Vec::new();
-    for column in own {
-        let below = &columns.rows[columns.starts[column] + 1..columns.starts[column + 1]];
-        groups.push(ColumnGroup { column, width: 1, below: below.to_vec() });
-        while let [.., child, parent] = &groups[..] {
-            let mut below: Vec<usize> =
-                child.below.iter().copied().filter(|&r| r >= parent.column + parent.width).collect();
-            below.extend(&parent.below);
-            below.sort_unstable();
-            below.dedup();
-            let joined = ColumnGroup::cost(child.width + parent.width, below.len());
-            let apart = ColumnGroup::cost(child.width, child.below.len())
-                + ColumnGroup::cost(parent.width, parent.below.len());
-            if joined > apart {
-                break;
-            }
-            let merged = ColumnGroup { column: child.column, width: child.width + parent.width, below };
-            groups.truncate(groups.len() - 2);
-            groups.push(merged);
-        }
-    }
-    groups
-}
-
-/// The columns of a group as a dense matrix, column after column of `height`.
-fn dense_block(columns: &ColumnFactor, group: &ColumnGroup, height: usize) -> Vec<f64> {
-    let mut dense = vec![0.0; group.width * height];
-    for k in 0..group.width {
-        let column = group.column + k;
-        for entry in columns.starts[column]..columns.starts[column + 1] {
-            let row = columns.rows[entry];
-            let at = if row < group.column + group.width {
-                row - group.column
-            } else {
-                group.width + group.below.partition_point(|&r| r < row)
-            };
-            dense[k * height + at] = columns.values[entry];
-        }
-    }
-    dense
-}
-
-/// [T; B] to [T^-1; B T^-1] for a lower triangle T.
-fn solved_block(dense: &[f64], width: usize, height: usize) -> Vec<f32> {
-    let mut inverse = vec![0.0; width * width];
-    for k in 0..width {
-        inverse[k * width + k] = 1.0 / dense[k * height + k];
-        for i in k + 1..width {
-            let sum: f64 = (k..i).map(|m| dense[m * height + i] * inverse[k * width + m]).sum();
-            inverse[k * width + i] = -sum / dense[i * height + i];
-        }
-    }
-    let mut solved = vec![0.0; width * height];
-    for k in 0..width {
-        for i in 0..height {
-            solved[k * height + i] = if i < width {
-                inverse[k * width + i] as f32
-            } else {
-                (k..width).map(|m| dense[m * height + i] * inverse[k * width + m]).sum::<f64>() as f32
-            };
-        }
-    }
-    solved
 }
 
 type Lanes = [f32; LANES];

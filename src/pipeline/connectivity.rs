@@ -4,18 +4,18 @@ use std::sync::{Arc, Mutex, MutexGuard, OnceLock};
 use glam::Vec3A;
 
 use crate::mesh::{Rim, Topology};
-use crate::numeric::{Dissection, SparseCholesky, SymmetricMatrix};
+use crate::numeric::{Elimination, SparseCholesky, SymmetricMatrix};
 use crate::spatial::SurfaceWalk;
 
-/// The triangles of a template with what is made for them once and kept: topology, elimination order, factors.
+/// The triangles of a template with what is made for them once and kept: topology, elimination, factors.
 pub struct Connectivity {
     /// Triangles, edges and rings.
     pub topology: Topology,
     /// Where they end.
     pub rim: Rim,
-    /// The shape `[N, 3]` that the elimination order is cut by.
+    /// The shape `[N, 3]` that the elimination's order is cut by.
     rest: Vec<Vec3A>,
-    dissection: OnceLock<Dissection>,
+    elimination: OnceLock<Arc<Elimination>>,
     walk: OnceLock<SurfaceWalk>,
     /// The edges of each triangle: from its first, second, third corner to the next.
     triangle_edges: Vec<[u32; 3]>,
@@ -36,15 +36,15 @@ impl Connectivity {
             rim: Rim::of(&topology),
             topology,
             rest: rest.to_vec(),
-            dissection: OnceLock::new(),
+            elimination: OnceLock::new(),
             walk: OnceLock::new(),
             diffusions: Mutex::default(),
         }
     }
 
-    /// The elimination order of the vertices.
-    pub fn dissection(&self) -> &Dissection {
-        self.dissection.get_or_init(|| Dissection::new(&self.topology, &self.rest))
+    /// How unknowns of the vertices are eliminated.
+    pub fn elimination(&self) -> &Arc<Elimination> {
+        self.elimination.get_or_init(|| Arc::new(Elimination::new(&self.topology, &self.rest)))
     }
 
     /// Nearest points from the last answer on.
@@ -58,7 +58,7 @@ impl Connectivity {
             .entry(lambda.to_bits())
             .or_insert_with(|| {
                 let matrix = SymmetricMatrix::diffusion(&self.topology, lambda.max(0.0));
-                let made = SparseCholesky::new(&self.topology, &matrix, self.dissection());
+                let made = SparseCholesky::new(self.elimination(), &matrix);
                 Arc::new(made.expect("I + lambda L is positive definite for lambda >= 0"))
             })
             .clone()

@@ -63,7 +63,7 @@ impl Sphere {
             .or_insert_with(|| {
                 let made = Reparameterization::new(
                     &self.connectivity.topology,
-                    self.connectivity.dissection(),
+                    self.connectivity.elimination(),
                     lambda.max(0.0),
                 );
                 Arc::new(made.expect("I + lambda L is positive definite for lambda >= 0"))
@@ -75,7 +75,8 @@ impl Sphere {
     pub fn curvature_density(&self) -> Arc<CurvatureDensity> {
         self.curvature
             .get_or_init(|| {
-                let made = CurvatureDensity::new(&self.connectivity.topology, self.connectivity.dissection());
+                let made =
+                    CurvatureDensity::new(&self.connectivity.topology, self.connectivity.elimination());
                 Arc::new(made.expect("every vertex of a sphere has neighbours"))
             })
             .clone()

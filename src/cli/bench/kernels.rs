@@ -1,8 +1,10 @@
 use std::hint::black_box;
+use std::sync::Arc;
 
 use glam::Vec3A;
+use nalgebra_sparse::factorization::CscCholesky;
 use onemesh::mesh::{Icosphere, LandmarkSet, Normals, Topology, TriangleMesh, mean_edge_lengths};
-use onemesh::numeric::{Dissection, SolveBuffer, SparseCholesky, SymmetricMatrix};
+use onemesh::numeric::{Elimination, SolveBuffer, SparseCholesky, SymmetricMatrix};
 use onemesh::pipeline::ScanSurface;
 use onemesh::preflight::Inspection;
 use onemesh::spatial::{SurfaceIndex, self_intersections};
@@ -25,12 +27,16 @@ pub fn solves(clock: &Clock, finest: usize) {
     for vertices in [2562, 10242, 40962].into_iter().filter(|&vertices| vertices <= finest) {
         let (topology, positions) = sphere(vertices);
         let matrix = SymmetricMatrix::diffusion(&topology, LAMBDA);
-        let dissection = Dissection::new(&topology, &positions);
+        let elimination = Arc::new(Elimination::new(&topology, &positions));
         clock.kernel(&format!("ordering, {vertices} vertices"), || {
-            black_box(Dissection::new(&topology, &positions));
+            black_box(Elimination::new(&topology, &positions));
         });
-        let factor = || SparseCholesky::new(&topology, &matrix, &dissection);
+        let factor = || SparseCholesky::new(&elimination, &matrix);
         clock.kernel(&format!("factor, {vertices} vertices"), || drop(black_box(factor())));
+        let library = matrix.in_order(&topology, &elimination.order);
+        clock.kernel(&format!("factor by nalgebra-sparse, {vertices} vertices"), || {
+            drop(black_box(CscCholesky::factor(&library)));
+        });
         let Ok(cholesky) = factor() else { continue };
         let (mut x, mut buffer) = (positions.clone(), SolveBuffer::default());
         clock.kernel_each(&format!("solve of three right-hand sides, {vertices} vertices"), 20, &mut || {

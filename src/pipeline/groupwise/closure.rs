@@ -59,7 +59,7 @@ impl<'a> Plate<'a> {
         let diagonal = laplacian.diagonal.iter().zip(unknown);
         let diagonal = diagonal.map(|(d, &unknown)| d + if unknown { FREE } else { FIXED }).collect();
         let held = SymmetricMatrix { diagonal, edges: laplacian.edges.clone() };
-        let system = SparseCholesky::new(topology, &held, connectivity.dissection()).ok()?;
+        let system = SparseCholesky::new(connectivity.elimination(), &held).ok()?;
         Some(Self { connectivity, unknown, laplacian, system, buffer: SolveBuffer::default() })
     }
 

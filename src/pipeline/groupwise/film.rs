@@ -67,9 +67,7 @@ fn flatten(sphere: &Sphere, p: &mut [Vec3A], film: &[bool]) {
         *diagonal += weight - 1.0;
         *drawn *= weight as f32;
     }
-    let Ok(system) =
-        SparseCholesky::new(&sphere.connectivity.topology, &matrix, sphere.connectivity.dissection())
-    else {
+    let Ok(system) = SparseCholesky::new(sphere.connectivity.elimination(), &matrix) else {
         return;
     };
     system.solve(&mut drawn, &mut SolveBuffer::default());

@@ -431,7 +431,7 @@ impl<'a> Registration<'a> {
             connectivity.add_point(&mut matrix, landmark.triangle, landmark.weights, weight);
         }
         self.rest.add_stiffness(self.phase.stiffness, &mut matrix);
-        SparseCholesky::new(&connectivity.topology, &matrix, connectivity.dissection()).ok()
+        SparseCholesky::new(connectivity.elimination(), &matrix).ok()
     }
 }
 

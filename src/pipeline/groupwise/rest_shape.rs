@@ -162,7 +162,7 @@ mod tests {
 
     fn smoother(sphere: &Sphere) -> SparseCholesky {
         let matrix = SymmetricMatrix::diffusion(&sphere.connectivity.topology, 5.0);
-        SparseCholesky::new(&sphere.connectivity.topology, &matrix, sphere.connectivity.dissection()).unwrap()
+        SparseCholesky::new(sphere.connectivity.elimination(), &matrix).unwrap()
     }
 
     #[test]

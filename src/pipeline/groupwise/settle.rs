@@ -106,7 +106,7 @@ impl Settling<'_> {
         self.add_turns(matches, &mut force, &mut matrix);
         // Triangles that are only partly for the scan do not take the rest of them along.
         force.iter_mut().enumerate().for_each(|(i, force)| *force *= rest.takes(i));
-        let system = SparseCholesky::new(topology, &matrix, rest.connectivity.dissection()).ok()?;
+        let system = SparseCholesky::new(rest.connectivity.elimination(), &matrix).ok()?;
         system.solve(&mut force, buffer);
         Some(force)
     }
