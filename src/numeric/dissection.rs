@@ -8,6 +8,9 @@ use crate::mesh::Topology;
 /// Parts this small are not dissected further.
 const LEAF: usize = 6;
 
+/// The halves of sets this large are dissected apart, on a thread each.
+const APART: usize = 1000;
+
 /// A nested-dissection ordering of a mesh's vertices: two halves that no edge joins, then the separator between them,
 /// each half ordered the same way. A Cholesky factor in this order is sparse, and its two halves solve independently.
 #[derive(Debug, Clone)]
@@ -24,11 +27,7 @@ impl Dissection {
     /// Dissects by planes through rest positions `[N, 3]`: of thirteen directions and three places each, the cut with
     /// the smallest separator.
     pub fn new(topology: &Topology, positions: &[Vec3A]) -> Self {
-        let mut cutter =
-            Cutter { topology, positions, side: vec![Side::Outside; positions.len()], order: Vec::new() };
-        let all: Vec<u32> = (0..positions.len() as u32).collect();
-        let (second, separator) = cutter.dissect(all);
-        Self { order: cutter.order, second, separator }
+        Cutter::new(topology, positions).dissect((0..positions.len() as u32).collect())
     }
 
     /// The two halves and the separator as ranges of the order.
@@ -44,79 +43,94 @@ enum Side {
     Second,
 }
 
-/// A cut of a vertex set: two halves and what separates them.
+/// A cut of a vertex set across a direction, after the first `half` of its vertices along it.
 struct Cut {
     cost: f64,
-    first: Vec<u32>,
-    second: Vec<u32>,
-    separator: Vec<u32>,
+    direction: Vec3A,
+    half: usize,
+    separator: HashSet<u32>,
 }
 
 struct Cutter<'a> {
     topology: &'a Topology,
     positions: &'a [Vec3A],
     side: Vec<Side>,
-    order: Vec<u32>,
 }
 
-impl Cutter<'_> {
-    /// Appends `set` to the order; returns where its second half and its separator begin.
-    fn dissect(&mut self, set: Vec<u32>) -> (usize, usize) {
-        if set.len() <= LEAF {
-            self.order.extend(set);
-            return (self.order.len(), self.order.len());
-        }
-        let cut = self.best_cut(&set);
-        if cut.first.is_empty() || cut.second.is_empty() {
-            self.order.extend(set);
-            return (self.order.len(), self.order.len());
-        }
-        self.dissect(cut.first);
-        let second = self.order.len();
-        self.dissect(cut.second);
-        let separator = self.order.len();
-        self.order.extend(self.along_longest_direction(cut.separator));
-        (second, separator)
+impl<'a> Cutter<'a> {
+    fn new(topology: &'a Topology, positions: &'a [Vec3A]) -> Self {
+        Self { topology, positions, side: vec![Side::Outside; positions.len()] }
     }
 
-    fn best_cut(&mut self, set: &[u32]) -> Cut {
+    /// The order of a set.
+    fn dissect(&mut self, set: Vec<u32>) -> Dissection {
+        let undivided = |set: Vec<u32>| Dissection { second: set.len(), separator: set.len(), order: set };
+        if set.len() <= LEAF {
+            return undivided(set);
+        }
+        let Some(cut) = self.best_cut(&set) else { return undivided(set) };
+        let sorted = self.sorted(&set, cut.direction);
+        let [first, second] = [&sorted[..cut.half], &sorted[cut.half..]]
+            .map(|half| half.iter().copied().filter(|v| !cut.separator.contains(v)).collect::<Vec<_>>());
+        if first.is_empty() || second.is_empty() {
+            return undivided(set);
+        }
+        let (topology, positions) = (self.topology, self.positions);
+        let (first, second) = if set.len() < APART {
+            (self.dissect(first), self.dissect(second))
+        } else {
+            // Which vertex lies on which side is each half's own.
+            rayon::join(|| self.dissect(first), || Cutter::new(topology, positions).dissect(second))
+        };
+        let mut order = first.order;
+        let second_start = order.len();
+        order.extend(second.order);
+        let separator = order.len();
+        let mut curve: Vec<u32> = cut.separator.into_iter().collect();
+        curve.sort_unstable();
+        order.extend(self.along_longest_direction(curve));
+        Dissection { order, second: second_start, separator }
+    }
+
+    /// A set by how far its vertices lie along a direction.
+    fn sorted(&self, set: &[u32], direction: Vec3A) -> Vec<u32> {
+        let key = |&v: &u32| (self.positions[v as usize].dot(direction), v);
+        let mut keyed: Vec<(f32, u32)> = set.iter().map(key).collect();
+        keyed.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        keyed.into_iter().map(|(_, v)| v).collect()
+    }
+
+    fn best_cut(&mut self, set: &[u32]) -> Option<Cut> {
         let mut best: Option<Cut> = None;
-        let mut sorted = set.to_vec();
         for direction in directions() {
-            let key = |v: &u32| self.positions[*v as usize].dot(direction);
-            sorted.sort_by(|a, b| key(a).total_cmp(&key(b)).then(a.cmp(b)));
+            let sorted = self.sorted(set, direction);
             for fraction in [0.46, 0.5, 0.54] {
-                let cut = self.cut(&sorted, (sorted.len() as f64 * fraction) as usize);
+                let cut = self.cut(&sorted, direction, (sorted.len() as f64 * fraction) as usize);
                 if best.as_ref().is_none_or(|b| cut.cost < b.cost) {
                     best = Some(cut);
                 }
             }
         }
-        best.unwrap_or(Cut { cost: 0.0, first: Vec::new(), second: Vec::new(), separator: Vec::new() })
+        best
     }
 
     /// Cuts after the first `half` vertices. The separator is the smallest set of vertices that touches every cut edge.
-    fn cut(&mut self, sorted: &[u32], half: usize) -> Cut {
+    fn cut(&mut self, sorted: &[u32], direction: Vec3A, half: usize) -> Cut {
         for (i, &v) in sorted.iter().enumerate() {
             self.side[v as usize] = if i < half { Side::First } else { Side::Second };
         }
-        let cover = smallest_cover(&sorted[..half], |v| {
-            self.topology
-                .neighbours
-                .row(v as usize)
-                .iter()
-                .copied()
-                .filter(|&w| self.side[w as usize] == Side::Second)
-        });
+        let across = |v: u32| {
+            let ring = self.topology.neighbours.row(v as usize).iter().copied();
+            ring.filter(|&w| self.side[w as usize] == Side::Second)
+        };
+        let separator = smallest_cover(&sorted[..half], across);
+        let of_first = separator.iter().filter(|&&v| self.side[v as usize] == Side::First).count();
         for &v in sorted {
             self.side[v as usize] = Side::Outside;
         }
-        let outside = |part: &[u32]| part.iter().copied().filter(|v| !cover.contains(v)).collect::<Vec<_>>();
-        let (first, second) = (outside(&sorted[..half]), outside(&sorted[half..]));
-        let imbalance = (first.len() as f64 - second.len() as f64).abs() / sorted.len() as f64;
-        let mut separator: Vec<u32> = cover.into_iter().collect();
-        separator.sort_unstable();
-        Cut { cost: separator.len() as f64 * (1.0 + imbalance), first, second, separator }
+        let (first, second) = (half - of_first, sorted.len() - half - (separator.len() - of_first));
+        let imbalance = (first as f64 - second as f64).abs() / sorted.len() as f64;
+        Cut { cost: separator.len() as f64 * (1.0 + imbalance), direction, half, separator }
     }
 
     /// A separator is a curve: ordered along it, neighbours stay together.

@@ -139,7 +139,7 @@ pub struct GroupwiseSettings {
     pub most_need: f32,
     /// Phases of a round, from stiff to soft.
     pub phases: usize,
-    /// Iterations of a phase.
+    /// Iterations of a phase in the last round; those before it take fewer. From a template, a single round takes twice as many.
     pub iterations: usize,
     /// Stiffness mu in the first and the last phase.
     pub stiffness: [f64; 2],

@@ -294,14 +294,13 @@ impl SphereCourse {
             moved => carried(&sphere, &own.shape, moved.iter().copied()),
         };
         let settings = &self.settings.groupwise;
-        let per_round = settings.phases * settings.iterations;
-        let iterations = per_round * settings.rounds;
+        let turn = Turn { round, rounds: settings.rounds };
+        let iterations = turn.total(settings);
         let watch = Watch { observer, stage: Stage::Groupwise, scan: &scan.name, iterations };
         let rest = RestShape::new(sphere.connectivity.clone(), mean.positions.clone());
         let start = moved_onto(&rest.positions, &shape, &own.known);
         let pulls = pulls(&mean.points, scan);
         let member = Member { scan: &scan.scan, landmarks: &pulls, start };
-        let turn = Turn { done: round * per_round, last: round + 1 == settings.rounds };
         let shape = register_member(&rest, member, settings, &watch, turn)?;
         Ok(self.after(round + 1, scan, shape))
     }

@@ -16,7 +16,7 @@ use super::observer::{Observer, Stage, Watch};
 use super::plan::PlanStage;
 use super::register::{LEAST_LANDMARKS, RegisterError, SAMPLES, Subject, moved_onto};
 use super::scan_surface::ScanSurface;
-use super::settings::Settings;
+use super::settings::{GroupwiseSettings, Settings};
 use super::sphere_course::contributions;
 use super::state::{Contribution, Mean, Placed, ScanState, SharedState};
 use super::template::Template;
@@ -100,15 +100,17 @@ impl TemplateCourse {
             }
             _ => return Err(RegisterError::State),
         };
-        let settings = &self.settings.transfer;
-        let per_round = settings.phases * settings.iterations;
-        let iterations = per_round * self.rounds;
+        let turn = Turn { round, rounds: self.rounds };
+        // A single round takes the time of two, and has nothing but its own to come near the scan by.
+        let transfer = &self.settings.transfer;
+        let iterations = transfer.iterations * if self.rounds == 1 { 2 } else { 1 };
+        let settings = &GroupwiseSettings { iterations, ..transfer.clone() };
+        let iterations = turn.total(settings);
         let watch = Watch { observer, stage: Stage::Register, scan: &scan.name, iterations };
         let Matched { parts, connectivity } = self.matched();
         let mask = parts.main.mask.as_deref();
         let rest = RestShape::new(connectivity.clone(), start.clone()).masked(mask);
         let member = Member { scan: &scan.scan, landmarks: &scan.pulls, start };
-        let turn = Turn { done: round * per_round, last: round + 1 == self.rounds };
         let shape = register_member(&rest, member, settings, &watch, turn)?;
         Ok(self.after(round + 1, &scan.scan, shape))
     }

@@ -18,8 +18,8 @@ use crate::spatial::{Hit, SurfaceIndex};
 const FACTOR_EVERY: usize = 8;
 
 /// One vertex in this many seeks its closest point among all in each iteration, before and after the shape has settled;
-/// the others walk to it from their last. Twelve scans came out alike with all of them searching, in a fifth more time.
-const FRESH: [usize; 2] = [4, 2];
+/// the others walk to it from their last. Twelve scans came out alike with all of them searching, in a third more time.
+const FRESH: [usize; 2] = [8, 4];
 
 /// Samples come in so many batches a phase, in turn.
 const BATCHES: usize = 2;
@@ -46,6 +46,11 @@ const SETTLED: f64 = 0.65;
 /// Diffusion of the normals along which films fall, so that all of one falls together.
 const FALL_SMOOTHING: f64 = 16.0;
 
+/// Iterations of a round before the last, as shares of the last one's: before and after the shape has settled. Members that are
+/// drawn all the way to their scans before there is a common shape slide on them, each its own way; but an open mouth is
+/// entered in these rounds or never.
+const SHARES: [(usize, usize); 2] = [(1, 3), (2, 3)];
+
 /// Share of the phases after which films fall: while the shape is stiff enough to fall in one piece.
 const FALLING: f64 = 0.4;
 
@@ -62,13 +67,49 @@ pub struct Member<'a> {
     pub start: Vec<Vec3A>,
 }
 
-/// Which of a member's registrations it is.
+/// Which of a member's registrations it is. In the last the shape settles on the scan and is unfolded there; from the others
+/// only a mean is taken.
 #[derive(Debug, Clone, Copy)]
 pub struct Turn {
-    /// Iterations done in those before.
-    pub done: usize,
-    /// None follows: the shape settles on the scan and is unfolded there. From the others only a mean is taken.
-    pub last: bool,
+    /// Those before.
+    pub round: usize,
+    /// All of them.
+    pub rounds: usize,
+}
+
+impl Turn {
+    fn is_last(self) -> bool {
+        self.round + 1 >= self.rounds
+    }
+
+    /// Iterations of a phase.
+    fn iterations(self, phase: usize, settings: &GroupwiseSettings) -> usize {
+        let (share, of) = SHARES[usize::from(has_settled(phase, settings))];
+        if self.is_last() { settings.iterations } else { (share * settings.iterations).div_ceil(of) }
+    }
+
+    /// Iterations of the rounds before it.
+    fn done(self, settings: &GroupwiseSettings) -> usize {
+        let of_round = |round| {
+            let turn = Self { round, ..self };
+            (0..settings.phases).map(move |phase| turn.iterations(phase, settings)).sum::<usize>()
+        };
+        (0..self.round).map(of_round).sum()
+    }
+
+    /// Iterations of all rounds.
+    pub fn total(self, settings: &GroupwiseSettings) -> usize {
+        Self { round: self.rounds, ..self }.done(settings)
+    }
+}
+
+/// How far a round is.
+fn share_of(phase: usize, settings: &GroupwiseSettings) -> f64 {
+    phase as f64 / (settings.phases - 1).max(1) as f64
+}
+
+fn has_settled(phase: usize, settings: &GroupwiseSettings) -> bool {
+    share_of(phase, settings) >= SETTLED
 }
 
 /// Deforms the rest shape to a member, stiff to soft; returns positions `[N, 3]` in the scan's unit space.
@@ -84,20 +125,21 @@ pub fn register_member(
 ) -> Result<Vec<Vec3A>, Canceled> {
     let (scan, landmarks) = (member.scan, member.landmarks);
     let mut registration = Registration::new(rest, member, settings);
+    let mut done = turn.done(settings);
     for phase in 0..settings.phases {
         registration.enter(phase);
-        for iteration in 0..settings.iterations {
+        for iteration in 0..turn.iterations(phase, settings) {
             let distance = registration.step(iteration);
-            watch.step(turn.done + phase * settings.iterations + iteration + 1, distance)?;
+            done += 1;
+            watch.step(done, distance)?;
         }
     }
-    let mut p = registration.p;
-    if turn.last {
+    let Registration { mut p, mut index, .. } = registration;
+    if turn.is_last() {
         // What settles on a fold keeps it, and settling may fold what was thin.
-        let unfold = |p: &mut _| unfold(&rest.connectivity, scan, landmarks, p);
-        unfold(&mut p);
-        settle(rest, scan, &settings.settle, &mut p);
-        unfold(&mut p);
+        unfold(&rest.connectivity, scan, landmarks, &mut index, &mut p);
+        settle(rest, scan, &settings.settle, &mut index, &mut p);
+        unfold(&rest.connectivity, scan, landmarks, &mut index, &mut p);
     }
     Ok(p)
 }
@@ -120,6 +162,7 @@ struct Registration<'a> {
     factored_weights: Vec<f32>,
     p: Vec<Vec3A>,
     normals: Normals,
+    /// Of the shape; built once, since what lies together stays together.
     index: SurfaceIndex,
     hints: Vec<u32>,
     samples_taken: usize,
@@ -182,10 +225,10 @@ impl<'a> Registration<'a> {
 
     fn enter(&mut self, phase: usize) {
         let settings = self.settings;
-        let x = phase as f64 / (settings.phases - 1).max(1) as f64;
+        let x = share_of(phase, settings);
         let ramp = |ramp: [f32; 2]| geometric(ramp.map(f64::from), x) as f32;
         let stiffness = geometric(settings.stiffness, x);
-        let settled = x >= SETTLED;
+        let settled = has_settled(phase, settings);
         // What hangs behind an open scan is held by nothing: the sheet in front turns its back on it.
         let held = settled && !self.scan.open;
         self.phase = Phase {
@@ -205,9 +248,6 @@ impl<'a> Registration<'a> {
         self.samples_taken += self.sample_hints.iter().map(Vec::len).sum::<usize>();
         self.sample_hints = vec![vec![NOWHERE; self.phase.samples]; BATCHES];
         self.smoother = Some(self.rest.connectivity.diffusion(geometric(settings.smoothing, x)));
-        if phase > 0 {
-            self.index = SurfaceIndex::new(&self.p, &self.rest.connectivity.topology.triangles);
-        }
     }
 
     /// One step of Gauss and Newton with a lagging matrix; returns the mean distance of the matches.

@@ -27,13 +27,20 @@ const INERTIA: f64 = 1e-3;
 /// E(d) = sum_s (n_s . (x_s - B_s p))^2 + l_t^2 |n_s - n_t(p)|^2 + mu sum_edges |d_i - d_j|^2, d the step from p and l_t a
 /// share of the triangle's size.
 /// Steps of Gauss and Newton bounded from above by a matrix that is alike in x, y and z, in which what slides along the surface
-/// moves little, so that what corresponds stays where it is.
-pub fn settle(rest: &RestShape, scan: &ScanSurface, settings: &SettleSettings, p: &mut [Vec3A]) {
+/// moves little, so that what corresponds stays where it is. `index` is of the triangles, wherever they were last.
+pub fn settle(
+    rest: &RestShape,
+    scan: &ScanSurface,
+    settings: &SettleSettings,
+    index: &mut SurfaceIndex,
+    p: &mut [Vec3A],
+) {
     if settings.iterations == 0 {
         return;
     }
     let topology = &rest.connectivity.topology;
-    let mut last = nearest(scan, &SurfaceIndex::new(p, &topology.triangles));
+    index.refit(p);
+    let mut last = nearest(scan, index);
     let mut buffer = SolveBuffer::default();
     let before = p.to_vec();
     let lengths = mean_edge_lengths(topology, p);
@@ -189,6 +196,11 @@ mod tests {
         (scan, RestShape::new(sphere.connectivity.clone(), p.clone()), p)
     }
 
+    fn settle_all(rest: &RestShape, scan: &ScanSurface, settings: &SettleSettings, p: &mut [Vec3A]) {
+        let mut index = SurfaceIndex::new(p, &rest.connectivity.topology.triangles);
+        settle(rest, scan, settings, &mut index, p);
+    }
+
     fn mean_squared_distance(scan: &ScanSurface, rest: &RestShape, p: &[Vec3A]) -> f32 {
         let index = SurfaceIndex::new(p, &rest.connectivity.topology.triangles);
         let sum: f32 = scan.samples.iter().map(|s| index.closest(s.point).distance_squared).sum();
@@ -199,7 +211,7 @@ mod tests {
     fn triangles_come_to_lie_on_the_scan_and_vertices_stay_in_their_places() {
         let (scan, rest, before) = inscribed();
         let mut p = before.clone();
-        settle(&rest, &scan, &SettleSettings { normals: 0.0, ..SETTINGS }, &mut p);
+        settle_all(&rest, &scan, &SettleSettings { normals: 0.0, ..SETTINGS }, &mut p);
         let [on_vertices, on_triangles] = [&before, &p].map(|p| mean_squared_distance(&scan, &rest, p));
         assert!(on_triangles < 0.35 * on_vertices, "{on_triangles} {on_vertices}");
         let edge = before[0].distance(before[rest.connectivity.topology.neighbours.row(0)[0] as usize]);
@@ -250,7 +262,7 @@ mod tests {
         let (scan, rest, before) = inscribed();
         let nothing = vec![0.0; before.len()];
         let mut p = before.clone();
-        settle(&rest.masked(Some(&nothing)), &scan, &SETTINGS, &mut p);
+        settle_all(&rest.masked(Some(&nothing)), &scan, &SETTINGS, &mut p);
         assert_eq!(p, before);
     }
 }

@@ -32,17 +32,25 @@ const NORMAL_ROUNDS: usize = 2;
 /// The vertices around each fold slide over the scan to the mean of their neighbours: a flat patch whose vertices all
 /// lie there has no folds (Tutte 1963). A fold keeps its new positions if fewer of its triangles are folded in them,
 /// the scan's samples there are no farther from it than they were, and no landmark drifts; otherwise its old ones.
-pub fn unfold(connectivity: &Connectivity, scan: &ScanSurface, landmarks: &[LandmarkPull], p: &mut [Vec3A]) {
+/// `index` is of its triangles, wherever they were last.
+pub fn unfold(
+    connectivity: &Connectivity,
+    scan: &ScanSurface,
+    landmarks: &[LandmarkPull],
+    index: &mut SurfaceIndex,
+    p: &mut [Vec3A],
+) {
     let folds = Folds { connectivity, scan, landmarks };
     let mut folded = folds.among(p, 0..connectivity.topology.triangles.len() as u32);
     if folded.is_empty() {
         return;
     }
-    let samples = folds.samples(p);
+    index.refit(p);
+    let samples = folds.samples(index);
     for (rings, iterations) in ATTEMPTS {
         let patches = folds.patches(&folded, rings);
         let smoothed = folds.smooth(p, &patches, iterations);
-        folds.keep_better(p, &smoothed, &patches, &samples);
+        folds.keep_better(p, &smoothed, &patches, &samples, index);
         folded = folds.among(p, folded.into_iter().chain(patches.triangles));
         if folded.is_empty() {
             return;
@@ -115,8 +123,7 @@ impl Folds<'_> {
     }
 
     /// The triangle that lies nearest each of the scan's samples.
-    fn samples(&self, p: &[Vec3A]) -> Vec<(Vec3A, u32)> {
-        let index = SurfaceIndex::new(p, &self.connectivity.topology.triangles);
+    fn samples(&self, index: &SurfaceIndex) -> Vec<(Vec3A, u32)> {
         let nearest = |k: usize| {
             let sample = self.scan.sample(k);
             (sample.weight > 0.0).then(|| (sample.point, index.closest(sample.point).triangle))
@@ -185,10 +192,17 @@ impl Folds<'_> {
     }
 
     /// Gives each patch that is better off the new positions.
-    fn keep_better(&self, p: &mut [Vec3A], smoothed: &[Vec3A], patches: &Patches, samples: &[(Vec3A, u32)]) {
+    fn keep_better(
+        &self,
+        p: &mut [Vec3A],
+        smoothed: &[Vec3A],
+        patches: &Patches,
+        samples: &[(Vec3A, u32)],
+        index: &mut SurfaceIndex,
+    ) {
         let near: Vec<(Vec3A, u32)> =
             samples.iter().filter(|(_, t)| patches.of(self.corners(*t)).is_some()).copied().collect();
-        let (before, after) = (self.standings(p, patches, &near), self.standings(smoothed, patches, &near));
+        let [before, after] = [&*p, smoothed].map(|p| self.standings(p, patches, &near, index));
         for &i in &patches.vertices {
             let patch = patches.of_vertex[i as usize] as usize;
             if after[patch].is_better_than(&before[patch]) {
@@ -198,14 +212,20 @@ impl Folds<'_> {
     }
 
     /// How each patch does, by its number.
-    fn standings(&self, p: &[Vec3A], patches: &Patches, near: &[(Vec3A, u32)]) -> Vec<Standing> {
+    fn standings(
+        &self,
+        p: &[Vec3A],
+        patches: &Patches,
+        near: &[(Vec3A, u32)],
+        index: &mut SurfaceIndex,
+    ) -> Vec<Standing> {
         let mut standings = vec![Standing::default(); p.len()];
         for t in self.among(p, patches.triangles.iter().copied()) {
             if let Some(patch) = patches.of(self.corners(t)) {
                 standings[patch].folded += 1;
             }
         }
-        let index = SurfaceIndex::new(p, &self.connectivity.topology.triangles);
+        index.refit(p);
         let distance = |&(point, triangle): &(Vec3A, u32)| {
             index.closest_below(point, f32::INFINITY, triangle).distance_squared
         };
@@ -243,6 +263,11 @@ mod tests {
         ScanSurface::new(&TriangleMesh::new(positions, sphere.triangles).unwrap(), SAMPLES)
     }
 
+    fn unfold_all(sphere: &Sphere, scan: &ScanSurface, landmarks: &[LandmarkPull], p: &mut [Vec3A]) {
+        let mut index = SurfaceIndex::new(p, &sphere.connectivity.topology.triangles);
+        unfold(&sphere.connectivity, scan, landmarks, &mut index, p);
+    }
+
     fn on_scan(scan: &ScanSurface, sphere: &Sphere) -> Vec<Vec3A> {
         sphere.rest.iter().map(|p| scan.to_unit(bumpy(*p).as_dvec3())).collect()
     }
@@ -259,7 +284,7 @@ mod tests {
         let folds = Folds { connectivity: &sphere.connectivity, scan: &scan, landmarks: &[] };
         let all = || 0..topology.triangles.len() as u32;
         assert!(folds.among(&p, all()).len() >= 2);
-        unfold(&sphere.connectivity, &scan, &[], &mut p);
+        unfold_all(&sphere, &scan, &[], &mut p);
         assert_eq!(folds.among(&p, all()), [0; 0]);
         let moved = (0..p.len()).filter(|&i| p[i] != flat[i]).count();
         assert!((1..60).contains(&moved), "{moved} moved");
@@ -279,7 +304,7 @@ mod tests {
         let triangle = topology.fans.row(a as usize)[0][0];
         let weights = topology.triangles[triangle as usize].map(|i| if i == a { 1.0 } else { 0.0 });
         let landmark = LandmarkPull { triangle, weights, target: p[a as usize], weight: 1.0 };
-        unfold(&sphere.connectivity, &scan, &[landmark], &mut p);
+        unfold_all(&sphere, &scan, &[landmark], &mut p);
         assert_eq!(p, before);
     }
 
@@ -288,7 +313,7 @@ mod tests {
         let (scan, sphere) = (scan(), Sphere::of_level(4));
         let before = on_scan(&scan, &sphere);
         let mut p = before.clone();
-        unfold(&sphere.connectivity, &scan, &[], &mut p);
+        unfold_all(&sphere, &scan, &[], &mut p);
         assert_eq!(p, before);
     }
 
@@ -299,7 +324,7 @@ mod tests {
         let mirrored = |p: &Vec3A| scan.to_unit(bumpy(Vec3A::new(-p.x, p.y, p.z)).as_dvec3());
         let before: Vec<Vec3A> = sphere.rest.iter().map(mirrored).collect();
         let mut p = before.clone();
-        unfold(&sphere.connectivity, &scan, &[], &mut p);
+        unfold_all(&sphere, &scan, &[], &mut p);
         assert_eq!(p, before);
     }
 }
