@@ -8,6 +8,7 @@ mod factorization;
 #[cfg(test)]
 pub mod finite_difference;
 mod kabsch;
+mod once;
 mod random;
 mod supernodal;
 
@@ -16,5 +17,6 @@ pub use cholesky::{NotPositiveDefinite, SparseCholesky, SymmetricMatrix};
 use dissection::Dissection;
 pub use elimination::Elimination;
 pub use kabsch::{Similarity, weighted_rotation};
+pub use once::once;
 pub use random::Random;
 pub use supernodal::SolveBuffer;

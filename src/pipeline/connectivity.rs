@@ -4,7 +4,7 @@ use std::sync::{Arc, Mutex, MutexGuard, OnceLock};
 use glam::Vec3A;
 
 use crate::mesh::{Rim, Topology};
-use crate::numeric::{Elimination, SparseCholesky, SymmetricMatrix};
+use crate::numeric::{Elimination, SparseCholesky, SymmetricMatrix, once};
 use crate::spatial::SurfaceWalk;
 
 /// The triangles of a template with what is made for them once and kept: topology, elimination, factors.
@@ -27,6 +27,19 @@ pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(|poisoned| poisoned.into_inner())
 }
 
+/// What a cache keeps for a lambda, made at its first use and outside of the cache, as by [`once`].
+pub(super) fn once_for<T>(
+    cache: &Mutex<HashMap<u64, Arc<T>>>,
+    lambda: f64,
+    make: impl FnOnce() -> T,
+) -> Arc<T> {
+    let kept = lock(cache).get(&lambda.to_bits()).cloned();
+    kept.unwrap_or_else(|| {
+        let made = Arc::new(make());
+        lock(cache).entry(lambda.to_bits()).or_insert(made).clone()
+    })
+}
+
 impl Connectivity {
     /// Triangles `[F, 3]` on positions `[N, 3]` that show which vertices are near each other.
     pub fn new(rest: &[Vec3A], triangles: &[[u32; 3]]) -> Self {
@@ -44,7 +57,7 @@ impl Connectivity {
 
     /// How unknowns of the vertices are eliminated.
     pub fn elimination(&self) -> &Arc<Elimination> {
-        self.elimination.get_or_init(|| Arc::new(Elimination::new(&self.topology, &self.rest)))
+        once(&self.elimination, || Arc::new(Elimination::new(&self.topology, &self.rest)))
     }
 
     /// Nearest points from the last answer on.
@@ -54,14 +67,11 @@ impl Connectivity {
 
     /// The solver of (I + lambda L) x = b, factored at its first use.
     pub fn diffusion(&self, lambda: f64) -> Arc<SparseCholesky> {
-        lock(&self.diffusions)
-            .entry(lambda.to_bits())
-            .or_insert_with(|| {
-                let matrix = SymmetricMatrix::diffusion(&self.topology, lambda.max(0.0));
-                let made = SparseCholesky::new(self.elimination(), &matrix);
-                Arc::new(made.expect("I + lambda L is positive definite for lambda >= 0"))
-            })
-            .clone()
+        once_for(&self.diffusions, lambda, || {
+            let matrix = SymmetricMatrix::diffusion(&self.topology, lambda.max(0.0));
+            let made = SparseCholesky::new(self.elimination(), &matrix);
+            made.expect("I + lambda L is positive definite for lambda >= 0")
+        })
     }
 
     /// Adds `weight` b b^T to a matrix, for a point b of barycentric weights on a triangle.

@@ -3,9 +3,10 @@ use std::sync::{Arc, LazyLock, Mutex, OnceLock};
 
 use glam::{DVec3, Vec3A};
 
-use super::connectivity::{Connectivity, lock};
+use super::connectivity::{Connectivity, lock, once_for};
 use crate::density::CurvatureDensity;
 use crate::mesh::{Icosphere, Midpoints, SurfacePoint, TriangleId};
+use crate::numeric::once;
 use crate::reparam::Reparameterization;
 use crate::spatial::SurfaceIndex;
 
@@ -58,28 +59,20 @@ impl Sphere {
 
     /// u and p for a lambda, factored at its first use.
     pub fn reparameterization(&self, lambda: f64) -> Arc<Reparameterization> {
-        lock(&self.reparameterizations)
-            .entry(lambda.to_bits())
-            .or_insert_with(|| {
-                let made = Reparameterization::new(
-                    &self.connectivity.topology,
-                    self.connectivity.elimination(),
-                    lambda.max(0.0),
-                );
-                Arc::new(made.expect("I + lambda L is positive definite for lambda >= 0"))
-            })
-            .clone()
+        once_for(&self.reparameterizations, lambda, || {
+            let Connectivity { topology, .. } = &*self.connectivity;
+            let made = Reparameterization::new(topology, self.connectivity.elimination(), lambda.max(0.0));
+            made.expect("I + lambda L is positive definite for lambda >= 0")
+        })
     }
 
     /// The curvature-driven density, factored at its first use.
     pub fn curvature_density(&self) -> Arc<CurvatureDensity> {
-        self.curvature
-            .get_or_init(|| {
-                let made =
-                    CurvatureDensity::new(&self.connectivity.topology, self.connectivity.elimination());
-                Arc::new(made.expect("every vertex of a sphere has neighbours"))
-            })
-            .clone()
+        let made = once(&self.curvature, || {
+            let made = CurvatureDensity::new(&self.connectivity.topology, self.connectivity.elimination());
+            Arc::new(made.expect("every vertex of a sphere has neighbours"))
+        });
+        made.clone()
     }
 
     /// The positions on the sphere of surface points.

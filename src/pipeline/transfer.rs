@@ -22,7 +22,7 @@ use super::state::{Contribution, Mean, Placed, ScanState, SharedState};
 use super::template::Template;
 use crate::energy::LandmarkPull;
 use crate::mesh::SurfacePoint;
-use crate::numeric::Similarity;
+use crate::numeric::{Similarity, once};
 
 /// How scans are registered from a template.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -73,7 +73,7 @@ impl TemplateCourse {
     }
 
     fn matched(&self) -> &Matched {
-        self.matched.get_or_init(|| {
+        once::<Arc<_>>(&self.matched, || {
             let parts = Parts::of(&self.template);
             let rest: Vec<Vec3A> = parts.main.positions.iter().map(|p| p.as_vec3a()).collect();
             let connectivity = Arc::new(Connectivity::new(&rest, &parts.main.triangles));

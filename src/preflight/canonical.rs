@@ -5,6 +5,7 @@ use super::face_model::FaceModel;
 use crate::demo::Sculptor;
 use crate::formats::Scheme;
 use crate::mesh::LandmarkSet;
+use crate::numeric::once;
 use glam::DVec3;
 
 /// Sculpted heads that stand for all faces.
@@ -23,7 +24,7 @@ pub(super) struct Canonical {
 /// Landmarks of all heads, in the scheme's order.
 fn heads() -> &'static [Vec<DVec3>] {
     static HEADS_LANDMARKS: OnceLock<Vec<Vec<DVec3>>> = OnceLock::new();
-    HEADS_LANDMARKS.get_or_init(|| Sculptor::landmarks_of_heads(1, HEADS, &STRENGTHS))
+    once::<Vec<_>>(&HEADS_LANDMARKS, || Sculptor::landmarks_of_heads(1, HEADS, &STRENGTHS))
 }
 
 impl Canonical {
