@@ -46,7 +46,9 @@ pub(super) struct Part {
 pub(super) struct Block {
     pub column: u32,
     pub width: u32,
-    /// Rows including the block's own, padded to a multiple of [`LANES`].
+    /// Rows including the block's own.
+    pub used: u32,
+    /// The same padded to a multiple of [`LANES`].
     pub height: u32,
     pub rows_start: u32,
     pub values_start: u32,
@@ -109,7 +111,7 @@ impl Elimination {
         let parts = dissection.parts().map(|own| {
             let groups = column_groups(symbolic.l_pattern(), own.clone());
             let mut part = Part::new(&groups, own, dissection.separator, place.len());
-            part.entries = part.entries(topology, &place);
+            part.entries = part.entries(topology, &place, dissection.separator);
             part.updates = Updates::of(&part);
             part
         });
@@ -121,19 +123,18 @@ impl Part {
     fn new(groups: &[ColumnGroup], own: Range<usize>, separator: usize, total: usize) -> Self {
         let ext = if own.start == separator { 0 } else { total - separator };
         let (mut blocks, mut rows, mut values) = (Vec::new(), Vec::new(), 0);
-        let local =
-            |row: usize| if own.contains(&row) { row - own.start } else { own.len() + row - separator };
         for group in groups {
             let used = group.width + group.below.len();
             let height = used.next_multiple_of(LANES);
             blocks.push(Block {
                 column: (group.column - own.start) as u32,
                 width: group.width as u32,
+                used: used as u32,
                 height: height as u32,
                 rows_start: rows.len() as u32,
                 values_start: values as u32,
             });
-            rows.extend(group.rows().map(|row| local(row) as u32));
+            rows.extend(group.rows().map(|row| local(&own, separator, row) as u32));
             rows.extend(std::iter::repeat_n((own.len() + ext) as u32, height - used));
             values += group.width * height;
         }
@@ -142,9 +143,7 @@ impl Part {
 
     /// The rows of a block, without its padding.
     pub fn rows(&self, block: &Block) -> &[u32] {
-        let rows = &self.rows[block.rows_start as usize..][..block.height as usize];
-        let padding = (self.own.len() + self.ext) as u32;
-        &rows[..rows.iter().position(|&row| row == padding).unwrap_or(rows.len())]
+        &self.rows[block.rows_start as usize..][..block.used as usize]
     }
 
     /// For each own column its block.
@@ -153,18 +152,15 @@ impl Part {
         self.blocks.iter().enumerate().flat_map(of_block).collect()
     }
 
-    fn entries(&self, topology: &Topology, place: &[usize]) -> Vec<[u32; 2]> {
+    fn entries(&self, topology: &Topology, place: &[usize], separator: usize) -> Vec<[u32; 2]> {
         let block_of_column = self.block_of_column();
-        let n = place.len();
-        let separator = n - self.ext;
         let mut entries = Vec::new();
         let mut add = |source: usize, a: usize, b: usize| {
             let (column, row) = (a.min(b), a.max(b));
             if !self.own.contains(&column) {
                 return;
             }
-            let row =
-                if self.own.contains(&row) { row - self.own.start } else { self.own.len() + row - separator };
+            let row = local(&self.own, separator, row);
             let column = column - self.own.start;
             let block = &self.blocks[block_of_column[column] as usize];
             let at = self.rows(block).partition_point(|&other| (other as usize) < row);
@@ -176,11 +172,16 @@ impl Part {
             add(v, at, at);
         }
         for (e, &[a, b]) in topology.edges.iter().enumerate() {
-            add(n + e, place[a as usize], place[b as usize]);
+            add(place.len() + e, place[a as usize], place[b as usize]);
         }
         entries.sort_unstable_by_key(|&[_, value]| value);
         entries
     }
+}
+
+/// Where a part has an unknown of the order: its own first, then the separator's.
+fn local(own: &Range<usize>, separator: usize, row: usize) -> usize {
+    if own.contains(&row) { row - own.start } else { own.len() + row - separator }
 }
 
 impl Updates {

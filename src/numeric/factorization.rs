@@ -58,7 +58,7 @@ fn eliminate(part: &Part, values: &mut [f64], added: &mut [f64], solved: &mut [f
         let start = block.values_start as usize;
         let end = start + (block.width * block.height) as usize;
         let (done, later) = values.split_at_mut(end);
-        let (own, rows) = (&mut done[start..], part.rows(block).len());
+        let (own, rows) = (&mut done[start..], block.used as usize);
         if !factor_block(own, block, rows) {
             return false;
         }

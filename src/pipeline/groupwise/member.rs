@@ -88,18 +88,20 @@ impl Turn {
         if self.is_last() { settings.iterations } else { (share * settings.iterations).div_ceil(of) }
     }
 
-    /// Iterations of the rounds before it.
+    /// Iterations of the round.
+    fn own(self, settings: &GroupwiseSettings) -> usize {
+        (0..settings.phases).map(|phase| self.iterations(phase, settings)).sum()
+    }
+
+    /// Iterations of the rounds before it, which are all alike.
     fn done(self, settings: &GroupwiseSettings) -> usize {
-        let of_round = |round| {
-            let turn = Self { round, ..self };
-            (0..settings.phases).map(move |phase| turn.iterations(phase, settings)).sum::<usize>()
-        };
-        (0..self.round).map(of_round).sum()
+        self.round * Self { round: 0, ..self }.own(settings)
     }
 
     /// Iterations of all rounds.
     pub fn total(self, settings: &GroupwiseSettings) -> usize {
-        Self { round: self.rounds, ..self }.done(settings)
+        let last = Self { round: self.rounds.saturating_sub(1), ..self };
+        last.done(settings) + last.own(settings)
     }
 }
 
