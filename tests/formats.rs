@@ -93,6 +93,41 @@ fn sheet(side: u32) -> TriangleMesh {
     TriangleMesh::new(positions, triangles).unwrap()
 }
 
+/// As ascii STL.
+fn stl(mesh: &TriangleMesh) -> Vec<u8> {
+    let vertex = |&i: &u32| {
+        let [x, y, z] = mesh.positions()[i as usize].to_array();
+        format!("vertex {x} {y} {z}\n")
+    };
+    let facet = |corners: &[u32; 3]| {
+        let vertices: String = corners.iter().map(vertex).collect();
+        format!("facet normal 0 0 1\nouter loop\n{vertices}endloop\nendfacet\n")
+    };
+    let facets: String = mesh.triangles().iter().map(facet).collect();
+    format!("solid sheet\n{facets}endsolid sheet\n").into_bytes()
+}
+
+#[test]
+fn a_file_that_is_read_a_piece_at_a_time_is_the_same_whole_or_cut_short() {
+    let mesh = sheet(100);
+    let files = [
+        (MeshFormat::Ply, ply_bytes(&mesh)),
+        (MeshFormat::Obj, obj_bytes(&mesh)),
+        (MeshFormat::Stl, stl(&mesh)),
+        (MeshFormat::Gltf, glb_bytes(&Glb::new(&mesh)).unwrap()),
+    ];
+    for (format, bytes) in files {
+        // Several pieces, one of which may end within a number.
+        assert!(bytes.len() > 300_000);
+        for end in (bytes.len() - 12..=bytes.len()).chain([262_143, 262_144, 262_145]) {
+            let whole = MeshFile::parse(&bytes[..end], format).map_err(|error| error.to_string());
+            let pieces =
+                MeshFile::read_from(&bytes[..end], end as u64, None).map_err(|error| error.to_string());
+            assert_eq!(pieces, whole, "{format:?} up to {end}");
+        }
+    }
+}
+
 /// The sheet with three vertices for each triangle, which glTF readers must weld.
 fn torn(mesh: &TriangleMesh) -> TriangleMesh {
     let positions = mesh.triangles().iter().flatten().map(|&i| mesh.positions()[i as usize]).collect();

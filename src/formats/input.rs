@@ -1,7 +1,9 @@
 use std::cell::RefCell;
-use std::fs;
-use std::io;
+use std::fs::{self, File};
+use std::io::{self, Read};
 use std::path::{Component, Path, PathBuf};
+
+use sha2::Digest;
 
 use super::digest::Sha256;
 use super::error::{Fault, FormatError};
@@ -25,14 +27,61 @@ impl InputFile {
 
 /// The whole of a regular file; pipes and devices, which may have no end, are refused.
 pub(super) fn read_regular(path: &Path) -> io::Result<Vec<u8>> {
-    if !fs::metadata(path)?.is_file() {
-        return Err(io::Error::new(io::ErrorKind::InvalidInput, "it is not a regular file"));
-    }
+    check_regular(path)?;
     fs::read(path)
 }
 
 pub(super) fn read_file(path: &Path) -> Result<Vec<u8>, FormatError> {
-    read_regular(path).map_err(|error| FormatError::from(Fault::Unreadable(error)).in_file(path))
+    read_regular(path).map_err(|error| unreadable(path, error))
+}
+
+fn check_regular(path: &Path) -> io::Result<()> {
+    if fs::metadata(path)?.is_file() {
+        return Ok(());
+    }
+    Err(io::Error::new(io::ErrorKind::InvalidInput, "it is not a regular file"))
+}
+
+fn unreadable(path: &Path, error: io::Error) -> FormatError {
+    FormatError::from(Fault::Unreadable(error)).in_file(path)
+}
+
+/// A regular file that is read a piece at a time, its digest taken on the way.
+pub(super) struct HashedFile {
+    path: PathBuf,
+    file: File,
+    /// Its size when it was opened, in bytes.
+    pub length: u64,
+    size: u64,
+    hasher: sha2::Sha256,
+}
+
+impl HashedFile {
+    pub fn open(path: &Path) -> Result<Self, FormatError> {
+        let open = || {
+            // Before it is opened: that of a pipe may wait for ever.
+            check_regular(path)?;
+            let file = File::open(path)?;
+            Ok((file.metadata()?.len(), file))
+        };
+        let (length, file) = open().map_err(|error| unreadable(path, error))?;
+        Ok(Self { path: path.to_owned(), file, length, size: 0, hasher: sha2::Sha256::new() })
+    }
+
+    /// What was read, with all of the file that was not.
+    pub fn finish(mut self) -> Result<InputFile, FormatError> {
+        io::copy(&mut self, &mut io::sink()).map_err(|error| unreadable(&self.path, error))?;
+        Ok(InputFile { path: self.path, size: self.size, sha256: self.hasher.into() })
+    }
+}
+
+impl Read for HashedFile {
+    fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
+        let count = self.file.read(out)?;
+        self.hasher.update(&out[..count]);
+        self.size += count as u64;
+        Ok(count)
+    }
 }
 
 /// The files beside the one being read, which it may name.

@@ -1,13 +1,15 @@
 use std::borrow::Cow;
+use std::io::Read;
 use std::path::Path;
 
 use glam::DVec2;
 
 use super::error::{Fault, FormatError};
 use super::geometry::{FileOrder, Geometry};
-use super::input::{self, InputFile, Siblings};
+use super::input::{HashedFile, InputFile, Siblings};
 use super::mesh_format::MeshFormat;
 use super::polygons::Polygons;
+use super::stream::Stream;
 use super::texture::{ImageOrigin, Texture};
 use super::{gltf, obj, ply, stl, text};
 use crate::mesh::TriangleMesh;
@@ -54,7 +56,17 @@ impl MeshFile {
     /// # Errors
     /// [`FormatError`] without a file; [`FormatError::in_file`] adds one. A glTF whose mesh is in other files is refused.
     pub fn parse(bytes: &[u8], format: MeshFormat) -> Result<Self, FormatError> {
-        Ok(Self::parse_beside(bytes, format, &Siblings::none())?)
+        Ok(Self::of_format(&mut Stream::of(bytes), format, &Siblings::none())?)
+    }
+
+    /// Reads the `length` bytes of a file as [`read`](Self::read) does. Beside what is read of them, 256 KiB of the bytes
+    /// or the longest line are in memory at a time; of glTF all.
+    ///
+    /// # Errors
+    /// As [`parse`](Self::parse).
+    pub fn read_from(input: impl Read, length: u64, extension: Option<&str>) -> Result<Self, FormatError> {
+        let mut stream = Stream::new(input, length);
+        Ok(Self::of_stream(&mut stream, extension, &Siblings::none()).map(|(file, _)| file)?)
     }
 
     /// The polygons that the mesh's triangles were cut from, with the mesh's vertex indices.
@@ -91,7 +103,14 @@ impl MeshFile {
 
     /// The file at `path` and those it was read from, the first of them `path` itself; pictures are not read.
     pub(super) fn read_with_inputs(path: &Path) -> Result<(Self, Vec<InputFile>), FormatError> {
-        let (file, _, inputs) = Self::of_bytes(&input::read_file(path)?, path)?;
+        let in_file = |fault| FormatError::from(fault).in_file(path);
+        let mut own = HashedFile::open(path)?;
+        let length = own.length;
+        let siblings = Siblings::of(path);
+        let read = Self::of_stream(&mut Stream::new(&mut own, length), extension(path), &siblings);
+        let (file, _) = read.map_err(in_file)?;
+        let mut inputs = vec![own.finish()?];
+        inputs.extend(siblings.into_read());
         Ok((file, inputs))
     }
 
@@ -101,29 +120,48 @@ impl MeshFile {
         path: &Path,
     ) -> Result<(Self, MeshFormat, Vec<InputFile>), FormatError> {
         let siblings = Siblings::of(path);
-        let extension = path.extension().and_then(|e| e.to_str());
-        let read = match MeshFormat::sniff(bytes, extension) {
-            Some(format) => Self::parse_beside(bytes, format, &siblings).map(|file| (file, format)),
-            None => Err(Fault::UnknownFormat { start: text::shown(bytes) }),
-        };
+        let read = Self::of_stream(&mut Stream::of(bytes), extension(path), &siblings);
         let (file, format) = read.map_err(|fault| FormatError::from(fault).in_file(path))?;
         let mut inputs = vec![InputFile::of(path, bytes)];
         inputs.extend(siblings.into_read());
         Ok((file, format, inputs))
     }
 
-    fn parse_beside(bytes: &[u8], format: MeshFormat, siblings: &Siblings) -> Result<Self, Fault> {
-        let Geometry { positions, polygons, colours, texture, order, warnings } = match format {
-            MeshFormat::Obj => obj::read(bytes, siblings),
-            MeshFormat::Ply => ply::read(bytes, siblings),
-            MeshFormat::Stl => stl::read(bytes),
-            MeshFormat::Gltf => gltf::read(bytes, siblings),
-        }?;
+    fn of_stream(
+        stream: &mut Stream,
+        extension: Option<&str>,
+        siblings: &Siblings,
+    ) -> Result<(Self, MeshFormat), Fault> {
+        let length = stream.left();
+        let beginning = stream.beginning();
+        let Some(format) = MeshFormat::sniff(beginning, length, extension) else {
+            let start = text::shown(beginning);
+            return Err(stream.error().map_or(Fault::UnknownFormat { start }, Fault::Unreadable));
+        };
+        Self::of_format(stream, format, siblings).map(|file| (file, format))
+    }
+
+    fn of_format(stream: &mut Stream, format: MeshFormat, siblings: &Siblings) -> Result<Self, Fault> {
+        let states_ras = states_ras(stream.beginning());
+        let read = match format {
+            MeshFormat::Obj => obj::read(stream, siblings),
+            MeshFormat::Ply => ply::read(stream, siblings),
+            MeshFormat::Stl => stl::read(stream),
+            MeshFormat::Gltf => gltf::read(&stream.rest(), siblings),
+        };
+        // What a reader says of a file that cannot be read on is not its fault.
+        if let Some(error) = stream.error() {
+            return Err(Fault::Unreadable(error));
+        }
+        let Geometry { positions, polygons, colours, texture, order, warnings } = read?;
         let (triangles, cut) = polygons.into_triangles();
         let mesh = TriangleMesh::new(positions, triangles)?;
-        let states_ras = states_ras(bytes);
         Ok(Self { mesh, cut, colours, texture, warnings, order, states_ras })
     }
+}
+
+fn extension(path: &Path) -> Option<&str> {
+    path.extension()?.to_str()
 }
 
 /// 3D Slicer notes the axes of a mesh in a comment at the beginning of its file.

@@ -24,9 +24,10 @@ const EXTENSIONS: [(&str, MeshFormat); 5] = [
 const OBJ_KEYWORDS: [&[u8]; 9] = [b"v", b"vn", b"vt", b"f", b"o", b"g", b"s", b"mtllib", b"usemtl"];
 
 impl MeshFormat {
-    /// The format of a file that holds `bytes`: as its content says, or else its extension (without the dot).
-    pub fn sniff(bytes: &[u8], extension: Option<&str>) -> Option<Self> {
-        Self::of_content(bytes).or_else(|| Self::of_extension(extension?))
+    /// The format of a file of `length` bytes, the first of them in `beginning`: as its content says, or else its
+    /// extension (without the dot).
+    pub fn sniff(beginning: &[u8], length: u64, extension: Option<&str>) -> Option<Self> {
+        Self::of_content(beginning, length).or_else(|| Self::of_extension(extension?))
     }
 
     /// The format that files with this extension (without the dot, in any case) have.
@@ -35,13 +36,13 @@ impl MeshFormat {
         found.map(|&(_, format)| format)
     }
 
-    fn of_content(bytes: &[u8]) -> Option<Self> {
+    fn of_content(bytes: &[u8], length: u64) -> Option<Self> {
         let text = without_mark(bytes);
         if bytes.starts_with(b"glTF") || text.trim_ascii_start().starts_with(b"{") {
             Some(Self::Gltf)
         } else if bytes.starts_with(b"ply\n") || bytes.starts_with(b"ply\r") {
             Some(Self::Ply)
-        } else if stl::looks_like_stl(bytes) {
+        } else if stl::looks_like_stl(bytes, length) {
             Some(Self::Stl)
         } else {
             looks_like_obj(text).then_some(Self::Obj)
@@ -62,7 +63,7 @@ mod tests {
 
     #[test]
     fn content_goes_before_extension() {
-        let sniff = |bytes: &[u8], extension| MeshFormat::sniff(bytes, extension);
+        let sniff = |bytes: &[u8], extension| MeshFormat::sniff(bytes, bytes.len() as u64, extension);
         assert_eq!(sniff(b"ply\nformat", Some("obj")), Some(MeshFormat::Ply));
         assert_eq!(sniff(b"glTF\x02", Some("ply")), Some(MeshFormat::Gltf));
         assert_eq!(sniff(b"\xEF\xBB\xBF \n{\"asset\"", None), Some(MeshFormat::Gltf));

@@ -26,6 +26,7 @@ mod polygons;
 mod scheme;
 mod splices;
 mod stl;
+mod stream;
 mod text;
 mod texture;
 mod weld;

@@ -24,16 +24,6 @@ impl<'a> Lines<'a> {
     pub fn continued(text: &'a [u8]) -> Self {
         Self { continued: true, ..Self::new(text) }
     }
-
-    /// The lines after the first `number`, of which `text` is the rest.
-    pub fn after(number: usize, text: &'a [u8]) -> Self {
-        Self { number, ..Self::new(text) }
-    }
-
-    /// What has not been read yet.
-    pub fn rest(&self) -> &'a [u8] {
-        self.rest
-    }
 }
 
 impl<'a> Iterator for Lines<'a> {
@@ -60,7 +50,7 @@ impl<'a> Iterator for Lines<'a> {
 }
 
 /// Where the line that `from` is in ends, and where the next one begins.
-fn line_end(text: &[u8], from: usize) -> (usize, usize) {
+pub(super) fn line_end(text: &[u8], from: usize) -> (usize, usize) {
     let length = text[from..].iter().position(|&b| b == b'\n' || b == b'\r');
     let end = from + length.unwrap_or(text.len() - from);
     let next = match &text[end..] {

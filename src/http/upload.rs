@@ -196,16 +196,13 @@ async fn sniff(app: &App, mesh: &Kept, file_name: Option<&str>) -> Result<Option
     if beginning.starts_with(b"PK\x03\x04") {
         return Ok(Some(MeshKind::Zip));
     }
-    // A binary STL has nothing but its length to be known by.
-    let triangles = beginning.get(80..84).and_then(|count| count.try_into().ok()).map(u32::from_le_bytes);
-    let stl = triangles.is_some_and(|count| mesh.info.size == 84 + 50 * u64::from(count));
-    Ok(match MeshFormat::sniff(&beginning, None) {
+    Ok(match MeshFormat::sniff(&beginning, mesh.info.size, None) {
         Some(MeshFormat::Gltf) if beginning.starts_with(b"glTF") => Some(MeshKind::Glb),
         Some(MeshFormat::Gltf) => Some(MeshKind::Gltf),
         Some(MeshFormat::Obj) => Some(MeshKind::Obj),
         Some(MeshFormat::Ply) => Some(MeshKind::Ply),
         Some(MeshFormat::Stl) => Some(MeshKind::Stl),
-        None => stl.then_some(MeshKind::Stl),
+        None => None,
     })
 }
 

@@ -1,6 +1,7 @@
 //! Files by their content, on the disk.
 
 use std::collections::HashMap;
+use std::fs::File;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -172,6 +173,19 @@ impl Blobs {
             hasher.update(&bytes);
         }
         if Sha256::from(hasher) == digest { Ok(()) } else { Err(StoreError::Corrupted { digest }) }
+    }
+
+    /// The file of a blob, whose bytes are held against its digest before, for readers that take a piece at a time. It
+    /// can be read as long as it is open, even where the blob is deleted meanwhile.
+    ///
+    /// # Errors
+    /// As [`read`](Self::read).
+    pub async fn open_file(&self, digest: Sha256) -> Result<File, StoreError> {
+        self.verify(digest).await?;
+        File::open(self.path(digest)).map_err(|error| match error.kind() {
+            std::io::ErrorKind::NotFound => StoreError::Missing { digest },
+            _ => StoreError::Folder { path: self.path(digest), error },
+        })
     }
 
     /// The file of a blob, for readers that need a path. Its bytes are not looked at.

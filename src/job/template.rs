@@ -1,6 +1,7 @@
 //! Uploaded templates: a mesh with landmarks, or what a finished collection left.
 
 use std::fmt;
+use std::fs::File;
 use std::path::PathBuf;
 use std::str::FromStr;
 
@@ -90,11 +91,11 @@ pub struct NewTemplate {
     pub mask: Option<Kept>,
 }
 
-/// The bytes of a template's files.
-#[derive(Debug, Clone)]
+/// A template's files: the mesh to be read, the others as bytes.
+#[derive(Debug)]
 pub struct TemplateFiles {
     kind: MeshKind,
-    mesh: Bytes,
+    mesh: File,
     landmarks: Option<Bytes>,
     mask: Option<Bytes>,
 }
@@ -227,7 +228,7 @@ impl TemplateFiles {
             }
         }
         let [landmarks, mask] = others;
-        Ok(Self { kind: parts.kind, mesh: blobs.read(parts.mesh).await?, landmarks, mask })
+        Ok(Self { kind: parts.kind, mesh: blobs.open_file(parts.mesh).await?, landmarks, mask })
     }
 
     /// Reads them, which takes long: not on an async thread. A frozen collection brings its settings. `scratch` is a
@@ -244,7 +245,7 @@ impl TemplateFiles {
         let files = ScanFiles { kind, mesh, landmarks, mask, texture: None };
         // The limits hold for frozen collections too, before their records are looked at.
         let read = files.read(limits, scratch)?;
-        match FrozenCollection::parse(&files.mesh).map_err(frozen_fault)? {
+        match FrozenCollection::parse(&files.mesh_bytes()?).map_err(frozen_fault)? {
             Some(_) if read.mask.is_some() => {
                 let problem = "goes with no frozen collection, which keeps its own: leave it out";
                 Err(ScanFault::Unfit { part: Part::Mask, problem: problem.to_owned() })

@@ -8,7 +8,10 @@ pub fn components(vertices: usize, triangles: &[[u32; 3]]) -> Vec<u32> {
             parent[one.max(other) as usize] = one.min(other);
         }
     }
-    (0..vertices as u32).map(|vertex| root(&mut parent, vertex)).collect()
+    for vertex in 0..vertices as u32 {
+        parent[vertex as usize] = root(&mut parent, vertex);
+    }
+    parent
 }
 
 /// The first vertex of a component, paths to it halved on the way.

@@ -21,6 +21,8 @@ pub(super) struct Connectivity {
     pub opposed_edges: usize,
     /// Vertices of no triangle.
     pub unreferenced_vertices: usize,
+    /// Triangles with the corners of one before them, in whatever order.
+    pub duplicate_triangles: usize,
     /// Six times the volume that the largest part encloses, its rims closed by fans; negative inside out.
     pub largest_volume: f64,
 }
@@ -50,20 +52,20 @@ pub struct BoundaryLoop {
 impl Connectivity {
     /// Of a mesh; sides of triangles that name a vertex twice are left out.
     pub fn of(mesh: &TriangleMesh) -> Self {
+        // As many as have their corners listed at a time: the list of all would be as large as the mesh.
+        const LISTED: usize = 1 << 16;
         const VERTICES: usize = 4096;
         let (triangles, vertices) = (mesh.triangles(), mesh.positions().len());
-        let corners = corners_at(vertices, triangles);
-        let starts: Vec<usize> = (0..vertices).step_by(VERTICES).collect();
-        let part = |&start: &usize| Fans::of(triangles, &corners, start..(start + VERTICES).min(vertices));
-        let parts: Vec<Fans> = starts.par_iter().map(part).collect();
-        drop(corners);
         let (mut found, mut rim) = (Self::default(), Vec::new());
-        for part in parts {
-            found.non_manifold_edges += part.non_manifold_edges;
-            found.non_manifold_vertices += part.non_manifold_vertices;
-            found.opposed_edges += part.opposed_edges;
-            found.unreferenced_vertices += part.unreferenced_vertices;
-            rim.extend(part.rim);
+        for first in (0..vertices).step_by(LISTED) {
+            let listed = first..(first + LISTED).min(vertices);
+            let corners = Corners::of(triangles, listed.clone());
+            let starts: Vec<usize> = listed.clone().step_by(VERTICES).collect();
+            let part = |&start: &usize| Fans::of(&corners, start..(start + VERTICES).min(listed.end));
+            for part in starts.par_iter().map(part).collect::<Vec<Fans>>() {
+                found.add_fans(&part);
+                rim.extend(part.rim);
+            }
         }
         let part_of = components(vertices, triangles);
         let largest = found.add_components(mesh, &part_of);
@@ -71,28 +73,40 @@ impl Connectivity {
         found
     }
 
-    /// Collects the parts, and the largest part's volume without its rims' fans; returns the largest part.
+    fn add_fans(&mut self, fans: &Fans) {
+        self.non_manifold_edges += fans.non_manifold_edges;
+        self.non_manifold_vertices += fans.non_manifold_vertices;
+        self.opposed_edges += fans.opposed_edges;
+        self.unreferenced_vertices += fans.unreferenced_vertices;
+        self.duplicate_triangles += fans.duplicate_triangles;
+    }
+
+    /// Collects the parts, and the largest part's volume without its rims' fans; returns the largest part's first vertex.
     fn add_components(&mut self, mesh: &TriangleMesh, part_of: &[u32]) -> u32 {
+        // Parts are called by their first vertices, which are few.
+        let firsts: Vec<u32> = (0..part_of.len() as u32).filter(|&v| part_of[v as usize] == v).collect();
+        let place = |v: u32| firsts.partition_point(|&first| first < part_of[v as usize]);
         let none = Component { triangles: 0, vertices: 0, area: 0.0 };
-        let mut parts = vec![none; part_of.len()];
-        let mut volumes = vec![0.0; part_of.len()];
+        let mut parts = vec![none; firsts.len()];
+        let mut volumes = vec![0.0; firsts.len()];
         let origin = mesh.centroid();
         for corners in mesh.triangles() {
-            let part = part_of[corners[0] as usize] as usize;
+            let part = place(corners[0]);
             let [a, b, c] = corners.map(|i| mesh.positions()[i as usize] - origin);
             parts[part].triangles += 1;
             parts[part].area += (b - a).cross(c - a).length() / 2.0;
             volumes[part] += a.dot(b.cross(c));
         }
-        part_of.iter().for_each(|&part| parts[part as usize].vertices += 1);
+        (0..part_of.len() as u32).for_each(|v| parts[place(v)].vertices += 1);
         let there = |at: &usize| parts[*at].triangles > 0;
         let area = |at: usize| parts[at].area;
         let largest = (0..parts.len()).filter(there).reduce(|a, b| if area(b) > area(a) { b } else { a });
-        let largest = largest.unwrap_or(0);
+        // A mesh has triangles.
+        let Some(largest) = largest else { return 0 };
         self.largest_volume = volumes[largest];
         self.components = parts.into_iter().filter(|part| part.triangles > 0).collect();
         self.components.sort_by(|a, b| b.area.total_cmp(&a.area));
-        largest as u32
+        firsts[largest]
     }
 
     /// Chains rim edges to loops, and closes those of the largest part for its volume.
@@ -124,6 +138,34 @@ struct Fans {
     non_manifold_vertices: usize,
     opposed_edges: usize,
     unreferenced_vertices: usize,
+    duplicate_triangles: usize,
+}
+
+/// The corners of triangles at some vertices, `3 f + k` the k-th of triangle f.
+struct Corners<'a> {
+    triangles: &'a [[u32; 3]],
+    first: usize,
+    rows: Rows<u32>,
+}
+
+impl<'a> Corners<'a> {
+    fn of(triangles: &'a [[u32; 3]], vertices: Range<usize>) -> Self {
+        let corners = triangles.as_flattened().iter().copied().zip(0..);
+        let own = corners.filter(|(vertex, _)| vertices.contains(&(*vertex as usize)));
+        let own = own.map(|(vertex, corner)| (vertex - vertices.start as u32, corner));
+        Self { triangles, first: vertices.start, rows: Rows::from_pairs(vertices.len(), own) }
+    }
+
+    fn at(&self, vertex: usize) -> &[u32] {
+        self.rows.row(vertex - self.first)
+    }
+
+    /// The vertices of a corner's triangle from the corner on, in the triangle's direction.
+    fn from(&self, corner: u32) -> [u32; 3] {
+        let mut triangle = self.triangles[corner as usize / 3];
+        triangle.rotate_left(corner as usize % 3);
+        triangle
+    }
 }
 
 /// A triangle's side at one of its ends.
@@ -139,15 +181,14 @@ struct Spoke {
 
 impl Fans {
     /// Every edge counts at its smaller vertex.
-    fn of(triangles: &[[u32; 3]], corners: &Rows<u32>, vertices: Range<usize>) -> Self {
+    fn of(corners: &Corners, vertices: Range<usize>) -> Self {
         let (mut found, mut spokes, mut sets) = (Self::default(), Vec::new(), Sets::default());
         for vertex in vertices {
-            let own = corners.row(vertex);
+            let own = corners.at(vertex);
             spokes.clear();
             for (place, &corner) in own.iter().enumerate() {
-                let [a, b, c] = triangles[corner as usize / 3];
-                if a != b && b != c && c != a {
-                    let [next, last] = [[b, c], [c, a], [a, b]][corner as usize % 3];
+                let [here, next, last] = corners.from(corner);
+                if here != next && next != last && last != here {
                     let spoke = |to, leaves| Spoke { to, corner: place as u32, leaves };
                     spokes.extend([spoke(next, true), spoke(last, false)]);
                 }
@@ -160,6 +201,7 @@ impl Fans {
             // A vertex has as many fans as its corners have sets.
             found.non_manifold_vertices += usize::from(sets.count() > 1);
             found.unreferenced_vertices += usize::from(own.is_empty());
+            found.duplicate_triangles += duplicates(corners, own);
         }
         found
     }
@@ -178,9 +220,17 @@ impl Fans {
     }
 }
 
-/// The corners of triangles, `3 f + k` the k-th of triangle f, by their vertices.
-fn corners_at(vertices: usize, triangles: &[[u32; 3]]) -> Rows<u32> {
-    Rows::from_pairs(vertices, triangles.as_flattened().iter().copied().zip(0..))
+/// How many triangles have the corners of one before them, of those whose smallest vertex is that of the `own` corners.
+fn duplicates(corners: &Corners, own: &[u32]) -> usize {
+    let sorted = |&corner: &u32| {
+        let [here, next, last] = corners.from(corner);
+        // Of a vertex that a triangle names twice its first corner stands for it.
+        let again = [next, last].iter().zip([1, 2]).any(|(&v, step)| v == here && corner % 3 + step > 2);
+        (here <= next && here <= last && !again).then_some([next.min(last), next.max(last)])
+    };
+    let mut others: Vec<[u32; 2]> = own.iter().filter_map(sorted).collect();
+    others.sort_unstable();
+    others.array_windows().filter(|[one, next]| one == next).count()
 }
 
 /// Directed edges `[E, 2]`, chained end to end as far as they go; against their direction only where there is no other
@@ -338,5 +388,24 @@ mod tests {
         assert_eq!(apart.components.len(), 2);
         let named_twice = of(square(), vec![[0, 1, 2], [0, 0, 1]]);
         assert_eq!(named_twice.loops.len(), 1);
+    }
+
+    #[test]
+    fn triangles_that_are_there_again_are_counted() {
+        let positions = (0..8).map(|i| DVec3::new(f64::from(i), f64::from(i * i), 0.0)).collect();
+        let distinct = [[0, 1, 2], [0, 1, 1], [0, 1, 3], [0, 3, 4], [5, 5, 6], [7, 7, 7]];
+        let again = [[2, 1, 0], [1, 2, 0], [1, 0, 1], [4, 0, 3], [6, 5, 5], [7, 7, 7]];
+        assert_eq!(of(positions, [distinct, again].concat()).duplicate_triangles, again.len());
+    }
+
+    #[test]
+    fn vertices_are_listed_in_parts_that_change_nothing() {
+        // 163842 vertices.
+        let Icosphere { positions, mut triangles } = Icosphere::new(7);
+        triangles.swap_remove(100_000);
+        let found = of(positions, triangles);
+        assert_eq!((found.components.len(), found.loops.len(), found.loops[0].vertices), (1, 1, 3));
+        let faults = [found.non_manifold_edges, found.non_manifold_vertices, found.opposed_edges];
+        assert_eq!((faults, found.unreferenced_vertices), ([0; 3], 0));
     }
 }

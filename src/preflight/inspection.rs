@@ -96,7 +96,7 @@ impl Inspection {
             non_manifold_edges: connectivity.non_manifold_edges,
             non_manifold_vertices: connectivity.non_manifold_vertices,
             degenerate_triangles: triangles::degenerate(mesh),
-            duplicate_triangles: triangles::duplicate(mesh),
+            duplicate_triangles: connectivity.duplicate_triangles,
             opposed_edges: connectivity.opposed_edges,
             unreferenced_vertices: connectivity.unreferenced_vertices,
             outward: clear.then_some(connectivity.largest_volume > 0.0),

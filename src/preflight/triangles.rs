@@ -1,5 +1,3 @@
-use rayon::prelude::*;
-
 use crate::mesh::TriangleMesh;
 
 /// A triangle lower than this share of its longest side has no area to speak of.
@@ -16,18 +14,6 @@ pub(super) fn degenerate(mesh: &TriangleMesh) -> usize {
     mesh.triangles().iter().filter(is_flat).count()
 }
 
-/// How many triangles have the corners of one before them, in whatever order.
-pub(super) fn duplicate(mesh: &TriangleMesh) -> usize {
-    let sorted = |corners: &[u32; 3]| {
-        let mut corners = *corners;
-        corners.sort_unstable();
-        corners
-    };
-    let mut all: Vec<[u32; 3]> = mesh.triangles().iter().map(sorted).collect();
-    all.par_sort_unstable();
-    all.array_windows().filter(|[one, next]| one == next).count()
-}
-
 #[cfg(test)]
 mod tests {
     use glam::DVec3;
@@ -37,9 +23,8 @@ mod tests {
     #[test]
     fn bad_triangles_are_counted() {
         let positions = vec![DVec3::ZERO, DVec3::X, DVec3::Y, 2.0 * DVec3::X, DVec3::new(1.0, 1e-9, 0.0)];
-        let triangles = vec![[0, 1, 2], [0, 1, 1], [0, 1, 3], [0, 3, 4], [2, 1, 0], [1, 2, 0], [2, 3, 1]];
+        let triangles = vec![[0, 1, 2], [0, 1, 1], [0, 1, 3], [0, 3, 4], [2, 3, 1]];
         let mesh = TriangleMesh::new(positions, triangles).unwrap();
         assert_eq!(degenerate(&mesh), 3);
-        assert_eq!(duplicate(&mesh), 2);
     }
 }

@@ -16,7 +16,7 @@ pub(super) struct Pictures {
 
 impl Pictures {
     /// Reads the MTL files of these names; those that are not there, or name pictures that are not, end in warnings.
-    pub fn read(libraries: &[&[u8]], siblings: &Siblings, warnings: &mut Vec<String>) -> Self {
+    pub fn read(libraries: &[Vec<u8>], siblings: &Siblings, warnings: &mut Vec<String>) -> Self {
         let mut pictures = Self::default();
         for library in libraries {
             let name = file_name(library);

@@ -16,14 +16,16 @@ use super::error::Fault;
 use super::geometry::Geometry;
 use super::input::Siblings;
 use super::polygons::Polygons;
-use super::text::{Lines, finite, integer, shown, without_mark, words};
+use super::stream::Stream;
+use super::text::{finite, integer, shown, words};
 use surface::Surface;
 
 /// Reads all vertices in their order and all faces. Normals and texture coordinates, which faces name by indices of
 /// their own, split no vertex.
-pub(super) fn read(bytes: &[u8], siblings: &Siblings) -> Result<Geometry, Fault> {
+pub(super) fn read(stream: &mut Stream, siblings: &Siblings) -> Result<Geometry, Fault> {
     let mut reader = Reader::default();
-    for line in Lines::continued(without_mark(bytes)) {
+    stream.skip_mark();
+    while let Some(line) = stream.continued_line() {
         let mut words = words(line.text);
         match words.next() {
             Some(b"v") => reader.vertex(line.number, words)?,
@@ -45,16 +47,16 @@ fn rest(line: &[u8]) -> &[u8] {
 }
 
 #[derive(Default)]
-struct Reader<'a> {
+struct Reader {
     positions: Vec<DVec3>,
     polygons: Polygons,
-    surface: Surface<'a>,
+    surface: Surface,
     /// The largest index that a face names, and its line: faces may come before their vertices.
     largest: Option<(u32, usize)>,
 }
 
-impl<'a> Reader<'a> {
-    fn vertex(&mut self, line: usize, mut words: impl Iterator<Item = &'a [u8]>) -> Result<(), Fault> {
+impl Reader {
+    fn vertex<'a>(&mut self, line: usize, mut words: impl Iterator<Item = &'a [u8]>) -> Result<(), Fault> {
         let mut position = [0.0; 3];
         for (coordinate, axis) in position.iter_mut().zip(["x", "y", "z"]) {
             let word = words.next().unwrap_or_default();
@@ -65,7 +67,7 @@ impl<'a> Reader<'a> {
         Ok(())
     }
 
-    fn face(&mut self, line: usize, words: impl Iterator<Item = &'a [u8]>) -> Result<(), Fault> {
+    fn face<'a>(&mut self, line: usize, words: impl Iterator<Item = &'a [u8]>) -> Result<(), Fault> {
         for word in words.take_while(|word| !word.starts_with(b"#")) {
             let mut names = word.split(|&b| b == b'/');
             let index = self.index(line, names.next().unwrap_or_default(), word)?;

@@ -11,7 +11,7 @@ use crate::formats::texture::{ImageOrigin, Texture};
 
 /// What an OBJ has beside its shape: colours, texture coordinates, materials. A mistake in them ends in a warning.
 #[derive(Default)]
-pub(super) struct Surface<'a> {
+pub(super) struct Surface {
     colours: Vec<[f32; 3]>,
     coordinates: Vec<DVec2>,
     /// For each corner read so far; corners without coordinates are filled in when one with them follows.
@@ -19,16 +19,16 @@ pub(super) struct Surface<'a> {
     largest: Option<(u32, usize)>,
     /// Why the texture coordinates cannot be used.
     fault: Option<String>,
-    libraries: Vec<&'a [u8]>,
-    materials: HashMap<&'a [u8], u32>,
+    libraries: Vec<Vec<u8>>,
+    materials: HashMap<Vec<u8>, u32>,
     material: Option<u32>,
     /// For each polygon read so far, as `corners`.
     polygon_materials: Vec<u32>,
 }
 
-impl<'a> Surface<'a> {
+impl Surface {
     /// Takes what stands behind a vertex's position: nothing, a weight, or red, green and blue.
-    pub fn colour(&mut self, mut words: impl Iterator<Item = &'a [u8]>) {
+    pub fn colour<'a>(&mut self, mut words: impl Iterator<Item = &'a [u8]>) {
         let mut next = || words.next().and_then(finite).map(|value| value as f32);
         if let (Some(red), Some(green), Some(blue)) = (next(), next(), next()) {
             self.colours.push([red, green, blue]);
@@ -36,7 +36,7 @@ impl<'a> Surface<'a> {
     }
 
     /// Takes a `vt`; its `v` is 0 where it is left out.
-    pub fn coordinate(&mut self, line: usize, mut words: impl Iterator<Item = &'a [u8]>) {
+    pub fn coordinate<'a>(&mut self, line: usize, mut words: impl Iterator<Item = &'a [u8]>) {
         let u = words.next().and_then(finite);
         let v = words.next().filter(|word| !word.starts_with(b"#")).map_or(Some(0.0), finite);
         if u.is_none() || v.is_none() {
@@ -74,16 +74,20 @@ impl<'a> Surface<'a> {
     }
 
     /// Takes a `usemtl`.
-    pub fn material(&mut self, name: &'a [u8]) {
+    pub fn material(&mut self, name: &[u8]) {
         let next = self.materials.len() as u32;
-        self.material = Some(*self.materials.entry(name).or_insert(next));
+        let known = self.materials.get(name).copied();
+        self.material = known.or_else(|| {
+            self.materials.insert(name.to_owned(), next);
+            Some(next)
+        });
     }
 
     /// Takes a `mtllib`.
-    pub fn library(&mut self, name: &'a [u8]) {
+    pub fn library(&mut self, name: &[u8]) {
         const MOST: usize = 64;
-        if self.libraries.len() < MOST && !self.libraries.contains(&name) {
-            self.libraries.push(name);
+        if self.libraries.len() < MOST && !self.libraries.iter().any(|known| known == name) {
+            self.libraries.push(name.to_owned());
         }
     }
 

@@ -1,33 +1,37 @@
 use super::body::Rows;
 use super::header::Scalar;
-use crate::formats::text::{Lines, finite, integer, shown};
+use crate::formats::stream::Stream;
+use crate::formats::text::{finite, integer, shown};
 
 /// Rows of text: one line each, blank lines between them passed over.
-pub(super) struct AsciiRows<'a> {
-    lines: Lines<'a>,
-    /// What is left of the current line.
-    row: &'a [u8],
+pub(super) struct AsciiRows<'a, 'b> {
+    stream: &'a mut Stream<'b>,
+    /// The current line, and where in it what is left of it begins.
+    row: Vec<u8>,
+    at: usize,
     number: usize,
 }
 
-impl<'a> AsciiRows<'a> {
-    /// The rows in `text`, which `lines` lines come before.
-    pub fn new(text: &'a [u8], lines: usize) -> Self {
-        Self { lines: Lines::after(lines, text), row: b"", number: lines }
+impl<'a, 'b> AsciiRows<'a, 'b> {
+    /// The rows in a text.
+    pub fn new(stream: &'a mut Stream<'b>) -> Self {
+        Self { stream, row: Vec::new(), at: 0, number: 0 }
     }
 
-    fn word(&mut self) -> Result<&'a [u8], String> {
-        self.row = self.row.trim_ascii_start();
-        let end = self.row.iter().position(u8::is_ascii_whitespace).unwrap_or(self.row.len());
-        let (word, rest) = self.row.split_at(end);
-        self.row = rest;
-        if word.is_empty() { Err("has fewer numbers than the header declares".to_owned()) } else { Ok(word) }
+    fn word(&mut self) -> Result<&[u8], String> {
+        let rest = self.row[self.at..].trim_ascii_start();
+        let end = rest.iter().position(u8::is_ascii_whitespace).unwrap_or(rest.len());
+        self.at = self.row.len() - rest.len() + end;
+        match &rest[..end] {
+            b"" => Err("has fewer numbers than the header declares".to_owned()),
+            word => Ok(word),
+        }
     }
 }
 
-impl Rows for AsciiRows<'_> {
-    fn left(&self) -> usize {
-        self.lines.rest().len()
+impl Rows for AsciiRows<'_, '_> {
+    fn left(&self) -> u64 {
+        self.stream.left()
     }
 
     fn least(&self, _: Scalar) -> usize {
@@ -35,11 +39,14 @@ impl Rows for AsciiRows<'_> {
     }
 
     fn start_row(&mut self) -> Result<(), String> {
-        let line = self.lines.by_ref().find(|line| !line.text.trim_ascii().is_empty());
-        let line = line.ok_or("is not there: the file ends before it")?;
-        self.row = line.text;
-        self.number = line.number;
-        Ok(())
+        while let Some(line) = self.stream.line() {
+            if !line.text.trim_ascii().is_empty() {
+                (self.at, self.number) = (0, line.number);
+                line.text.clone_into(&mut self.row);
+                return Ok(());
+            }
+        }
+        Err("is not there: the file ends before it".to_owned())
     }
 
     fn number(&mut self, _: Scalar) -> Result<f64, String> {
@@ -61,7 +68,7 @@ impl Rows for AsciiRows<'_> {
     }
 
     fn end_row(&mut self) -> Result<(), String> {
-        match self.row.trim_ascii() {
+        match self.row[self.at..].trim_ascii() {
             b"" => Ok(()),
             rest => Err(format!("has more numbers than the header declares: `{}`", shown(rest))),
         }

@@ -1,20 +1,20 @@
 use super::body::Rows;
 use super::header::Scalar;
+use crate::formats::stream::Stream;
 
 /// Rows of packed numbers, the most significant byte first where `BIG`.
-pub(super) struct BinaryRows<'a, const BIG: bool> {
-    rest: &'a [u8],
+pub(super) struct BinaryRows<'a, 'b, const BIG: bool> {
+    stream: &'a mut Stream<'b>,
 }
 
-impl<'a, const BIG: bool> BinaryRows<'a, BIG> {
-    pub fn new(bytes: &'a [u8]) -> Self {
-        Self { rest: bytes }
+impl<'a, 'b, const BIG: bool> BinaryRows<'a, 'b, BIG> {
+    pub fn new(stream: &'a mut Stream<'b>) -> Self {
+        Self { stream }
     }
 
     /// The next `N` bytes, the least significant first.
     fn take<const N: usize>(&mut self) -> Result<[u8; N], String> {
-        let (&(mut bytes), rest) = self.rest.split_first_chunk::<N>().ok_or_else(cut_short)?;
-        self.rest = rest;
+        let mut bytes = self.stream.take::<N>().ok_or_else(cut_short)?;
         if BIG {
             bytes.reverse();
         }
@@ -27,9 +27,9 @@ fn cut_short() -> String {
     "is cut short: the file ends within it".to_owned()
 }
 
-impl<const BIG: bool> Rows for BinaryRows<'_, BIG> {
-    fn left(&self) -> usize {
-        self.rest.len()
+impl<const BIG: bool> Rows for BinaryRows<'_, '_, BIG> {
+    fn left(&self) -> u64 {
+        self.stream.left()
     }
 
     fn least(&self, scalar: Scalar) -> usize {
@@ -66,9 +66,8 @@ impl<const BIG: bool> Rows for BinaryRows<'_, BIG> {
     }
 
     fn skip(&mut self, scalar: Scalar, count: u64) -> Result<(), String> {
-        let bytes = count.checked_mul(scalar.size() as u64).and_then(|bytes| usize::try_from(bytes).ok());
-        self.rest = bytes.and_then(|bytes| self.rest.get(bytes..)).ok_or_else(cut_short)?;
-        Ok(())
+        let bytes = count.checked_mul(scalar.size() as u64);
+        if bytes.is_some_and(|bytes| self.stream.skip(bytes)) { Ok(()) } else { Err(cut_short()) }
     }
 
     fn end_row(&mut self) -> Result<(), String> {

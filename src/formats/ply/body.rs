@@ -8,7 +8,7 @@ use crate::formats::input::Siblings;
 /// Rows of numbers in one of PLY's encodings. Problems are sentences without a place: the caller knows the row.
 pub(super) trait Rows {
     /// Bytes not read yet.
-    fn left(&self) -> usize;
+    fn left(&self) -> u64;
     /// The fewest bytes that a number takes.
     fn least(&self, scalar: Scalar) -> usize;
     fn start_row(&mut self) -> Result<(), String>;
@@ -55,7 +55,7 @@ fn check_room(element: &Element, rows: &impl Rows) -> Result<(), Fault> {
     };
     let row: u64 = element.properties.iter().map(|property| least(property.kind)).sum();
     // The last word of a text needs no blank after it.
-    let left = rows.left() as u64 + 1;
+    let left = rows.left() + 1;
     if element.count.saturating_mul(row) <= left {
         return Ok(());
     }

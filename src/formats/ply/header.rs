@@ -1,5 +1,6 @@
 use crate::formats::error::Fault;
-use crate::formats::text::{Lines, integer, shown, words};
+use crate::formats::stream::Stream;
+use crate::formats::text::{integer, shown, words};
 
 /// How the rows after the header are written.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -54,10 +55,6 @@ pub(super) struct Header {
     pub elements: Vec<Element>,
     /// The pictures that comments name, as MeshLab writes them.
     pub pictures: Vec<String>,
-    /// Its size in bytes: the rows follow.
-    pub length: usize,
-    /// Its number of lines.
-    pub lines: usize,
 }
 
 impl Scalar {
@@ -91,19 +88,17 @@ impl Scalar {
 }
 
 impl Header {
-    /// Reads up to and including the line `end_header`.
-    pub fn read(bytes: &[u8]) -> Result<Self, Fault> {
-        let mut lines = Lines::new(bytes);
-        if lines.next().is_none_or(|line| line.text.trim_ascii() != b"ply") {
-            return Err(Fault::at(
-                "line 1",
-                format!("a PLY file begins with `ply`, not with `{}`", shown(bytes)),
-            ));
+    /// Reads up to and including the line `end_header`; the rows follow.
+    pub fn read(stream: &mut Stream) -> Result<Self, Fault> {
+        let first = stream.line().map_or(&b""[..], |line| line.text);
+        if first.trim_ascii() != b"ply" {
+            let problem = format!("a PLY file begins with `ply`, not with `{}`", shown(first));
+            return Err(Fault::at("line 1", problem));
         }
         let mut encoding = None;
         let mut elements = Vec::new();
         let mut pictures = Vec::new();
-        while let Some(line) = lines.next() {
+        while let Some(line) = stream.line() {
             let statement: Vec<_> = words(line.text).collect();
             let outcome = match statement[..] {
                 [b"comment", b"TextureFile", ..] => {
@@ -113,8 +108,7 @@ impl Header {
                 [] | [b"comment" | b"obj_info", ..] => Ok(()),
                 [b"end_header"] => {
                     let encoding = encoding.ok_or_else(|| Fault::at("the header", "has no line `format`"))?;
-                    let length = bytes.len() - lines.rest().len();
-                    return Ok(Self { encoding, elements, pictures, length, lines: line.number });
+                    return Ok(Self { encoding, elements, pictures });
                 }
                 [b"format", name, ..] => read_encoding(name).map(|read| encoding = Some(read)),
                 [b"element", name, count] => read_element(name, count).map(|element| elements.push(element)),

@@ -17,18 +17,18 @@ pub use writer::{Ply, ply_bytes, write_ply};
 use super::error::Fault;
 use super::geometry::Geometry;
 use super::input::Siblings;
+use super::stream::Stream;
 use ascii::AsciiRows;
 use binary::BinaryRows;
 use header::{Encoding, Header};
 
 /// Reads positions, colours and texture coordinates of the element `vertex`, and the polygons of the element `face` with
 /// their texture coordinates. Other properties and elements are skipped.
-pub(super) fn read(bytes: &[u8], siblings: &Siblings) -> Result<Geometry, Fault> {
-    let header = Header::read(bytes)?;
-    let data = &bytes[header.length..];
+pub(super) fn read(stream: &mut Stream, siblings: &Siblings) -> Result<Geometry, Fault> {
+    let header = Header::read(stream)?;
     match header.encoding {
-        Encoding::Ascii => body::read(&header, AsciiRows::new(data, header.lines), siblings),
-        Encoding::LittleEndian => body::read(&header, BinaryRows::<false>::new(data), siblings),
-        Encoding::BigEndian => body::read(&header, BinaryRows::<true>::new(data), siblings),
+        Encoding::Ascii => body::read(&header, AsciiRows::new(stream), siblings),
+        Encoding::LittleEndian => body::read(&header, BinaryRows::<false>::new(stream), siblings),
+        Encoding::BigEndian => body::read(&header, BinaryRows::<true>::new(stream), siblings),
     }
 }

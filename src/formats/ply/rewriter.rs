@@ -9,6 +9,7 @@ use super::header::{Element, Encoding, Header, Kind, Scalar};
 use crate::formats::area_normals::AreaNormals;
 use crate::formats::error::Fault;
 use crate::formats::splices::Splices;
+use crate::formats::stream::Stream;
 use crate::formats::text::{Lines, integer};
 
 /// The bytes of a PLY that was read before, its vertices at other positions `[N, 3]`; normals are those of the triangles
@@ -18,14 +19,15 @@ pub(in crate::formats) fn rewrite(
     positions: &[DVec3],
     triangles: &[[u32; 3]],
 ) -> Result<Vec<u8>, Fault> {
-    let header = Header::read(bytes)?;
+    let mut rows = Stream::of(bytes);
+    let header = Header::read(&mut rows)?;
     let vertices = Vertices::new(header.element("vertex")?, positions, triangles)?;
-    let data = &bytes[header.length..];
+    let start = bytes.len() - rows.left() as usize;
     let mut out = Splices::new(bytes);
     match header.encoding {
-        Encoding::Ascii => vertices.ascii(&header, data, &mut out)?,
-        Encoding::LittleEndian => vertices.binary::<false>(&header, data, &mut out)?,
-        Encoding::BigEndian => vertices.binary::<true>(&header, data, &mut out)?,
+        Encoding::Ascii => vertices.ascii(&header, &bytes[start..], &mut out)?,
+        Encoding::LittleEndian => vertices.binary::<false>(&header, &bytes[start..], start, &mut out)?,
+        Encoding::BigEndian => vertices.binary::<true>(&header, &bytes[start..], start, &mut out)?,
     }
     Ok(out.finish())
 }
@@ -100,8 +102,16 @@ impl<'a> Vertices<'a> {
         Ok(())
     }
 
-    fn binary<const BIG: bool>(&self, header: &Header, data: &[u8], out: &mut Splices) -> Result<(), Fault> {
-        let mut rows = BinaryRows::<BIG>::new(data);
+    /// Replaces what is in `data`, all bytes from the `first` on.
+    fn binary<const BIG: bool>(
+        &self,
+        header: &Header,
+        data: &[u8],
+        first: usize,
+        out: &mut Splices,
+    ) -> Result<(), Fault> {
+        let mut stream = Stream::of(data);
+        let mut rows = BinaryRows::<BIG>::new(&mut stream);
         let damaged = |problem| Fault::at("the rows", problem);
         for element in header.elements.iter().take_while(|element| element.name != self.element.name) {
             for _ in 0..if element.properties.is_empty() { 0 } else { element.count } {
@@ -110,7 +120,7 @@ impl<'a> Vertices<'a> {
         }
         for vertex in 0..self.element.count as usize {
             for (at, property) in self.element.properties.iter().enumerate() {
-                let start = header.length + data.len() - rows.left();
+                let start = first + data.len() - rows.left() as usize;
                 match property.kind {
                     Kind::List { count, item } => {
                         let items = list_length(count, &mut rows).map_err(damaged)?;

@@ -1,13 +1,14 @@
 use glam::DVec3;
 
 use crate::formats::error::Fault;
-use crate::formats::text::{Lines, finite, shown, words};
+use crate::formats::stream::Stream;
+use crate::formats::text::{finite, shown, words};
 
 /// The corners of all triangles `[3 F]`.
-pub(super) fn read(text: &[u8]) -> Result<Vec<DVec3>, Fault> {
+pub(super) fn read(stream: &mut Stream) -> Result<Vec<DVec3>, Fault> {
     let mut corners = Vec::new();
     let mut ended = false;
-    for line in Lines::new(text) {
+    while let Some(line) = stream.line() {
         let mut words = words(line.text);
         let problem = match words.next() {
             Some(b"vertex") => corner(words).map(|point| corners.push(point)),

@@ -1,6 +1,7 @@
 use glam::DVec3;
 
 use crate::formats::error::Fault;
+use crate::formats::stream::Stream;
 
 /// Anything at all, then the count of triangles.
 const HEADER: usize = 84;
@@ -8,28 +9,31 @@ const HEADER: usize = 84;
 const TRIANGLE: usize = 50;
 
 /// Whether a file is as long as its count of triangles says.
-pub(super) fn has_its_length(bytes: &[u8]) -> bool {
-    declared(bytes).is_some_and(|length| length == bytes.len() as u64) && bytes.len() > HEADER
+pub(super) fn has_its_length(beginning: &[u8], length: u64) -> bool {
+    declared(beginning) == Some(length) && length > HEADER as u64
 }
 
 /// The corners of all triangles `[3 F]`.
-pub(super) fn read(bytes: &[u8]) -> Result<Vec<DVec3>, Fault> {
-    let declared = declared(bytes).ok_or_else(|| {
-        let problem =
-            format!("is cut short: binary STL begins with {HEADER} bytes, here are {}", bytes.len());
+pub(super) fn read(stream: &mut Stream) -> Result<Vec<DVec3>, Fault> {
+    let length = stream.left();
+    let header = stream.take::<HEADER>();
+    let declared = header.and_then(|header| declared(&header)).ok_or_else(|| {
+        let problem = format!("is cut short: binary STL begins with {HEADER} bytes, here are {length}");
         Fault::at("the header", problem)
     })?;
-    if declared > bytes.len() as u64 {
+    let triangles = (declared - HEADER as u64) / TRIANGLE as u64;
+    let cut_short = || {
         let problem = format!(
-            "declares {} triangles, which take {declared} bytes, but the file has {}: it is cut short or damaged",
-            (declared - HEADER as u64) / TRIANGLE as u64,
-            bytes.len()
+            "declares {triangles} triangles, which take {declared} bytes, but the file has {length}: it is cut short or damaged"
         );
-        return Err(Fault::at("the header", problem));
+        Fault::at("the header", problem)
+    };
+    if declared > length {
+        return Err(cut_short());
     }
-    let (triangles, _) = bytes[HEADER..declared as usize].as_chunks::<TRIANGLE>();
-    let mut corners = Vec::with_capacity(3 * triangles.len());
-    for (number, triangle) in triangles.iter().enumerate() {
+    let mut corners = Vec::with_capacity(3 * triangles as usize);
+    for number in 0..triangles {
+        let triangle = stream.take::<TRIANGLE>().ok_or_else(cut_short)?;
         let (numbers, _) = triangle.as_chunks::<4>();
         let (points, _) = numbers[3..].as_chunks::<3>();
         for point in points {

@@ -10,27 +10,31 @@ use glam::DVec3;
 use super::error::Fault;
 use super::geometry::{FileOrder, Geometry, Numbers};
 use super::polygons::Polygons;
+use super::stream::Stream;
 use super::weld::weld;
 
 /// Reads all triangles. Normals and attribute bytes are passed over: the corners' order says what is outside.
-pub(super) fn read(bytes: &[u8]) -> Result<Geometry, Fault> {
-    let corners = if is_ascii(bytes) { ascii::read(bytes) } else { binary::read(bytes) }?;
+pub(super) fn read(stream: &mut Stream) -> Result<Geometry, Fault> {
+    let length = stream.left();
+    let corners =
+        if is_ascii(stream.beginning(), length) { ascii::read(stream) } else { binary::read(stream) }?;
     let welded = weld(separate(corners)?);
     // A corner has no number: programs count those of a file differently.
     let order = FileOrder { vertices: Numbers::None, ..welded.order };
     Ok(Geometry { order, ..welded })
 }
 
-/// Whether the content alone says that these bytes are STL.
-pub(super) fn looks_like_stl(bytes: &[u8]) -> bool {
-    binary::has_its_length(bytes) || (is_ascii(bytes) && contains(bytes, b"facet"))
+/// Whether the content alone says that a file of so many bytes is STL.
+pub(super) fn looks_like_stl(beginning: &[u8], length: u64) -> bool {
+    binary::has_its_length(beginning, length)
+        || (is_ascii(beginning, length) && contains(beginning, b"facet"))
 }
 
 /// Binary files too may begin with `solid`, but not have the length that their count of triangles asks for by chance.
-fn is_ascii(bytes: &[u8]) -> bool {
-    bytes.trim_ascii_start().starts_with(b"solid")
-        && !binary::has_its_length(bytes)
-        && !contains(bytes, b"\0")
+fn is_ascii(beginning: &[u8], length: u64) -> bool {
+    beginning.trim_ascii_start().starts_with(b"solid")
+        && !binary::has_its_length(beginning, length)
+        && !contains(beginning, b"\0")
 }
 
 /// Whether `word` is in the beginning of a file.

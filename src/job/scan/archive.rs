@@ -1,5 +1,4 @@
-use std::fs;
-use std::io::Cursor;
+use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 
 use super::fault::{Part, ScanFault};
@@ -15,9 +14,9 @@ const USEFUL: [&str; 13] =
 const PICTURES: [&str; 3] = ["png", "jpg", "jpeg"];
 
 /// Unpacks a zip into a folder, as far as it belongs to its one mesh, and says where that is.
-pub(super) fn unpack(bytes: &[u8], folder: &Path, limits: &ScanLimits) -> Result<PathBuf, ScanFault> {
+pub(super) fn unpack(zip: &File, folder: &Path, limits: &ScanLimits) -> Result<PathBuf, ScanFault> {
     let most = ArchiveLimits { files: limits.zip_files, bytes: limits.unpacked_bytes };
-    let names = archive::unpack(Cursor::new(bytes), folder, most, |name| ends_in(name, &USEFUL));
+    let names = archive::unpack(zip, folder, most, |name| ends_in(name, &USEFUL));
     let mut meshes = Vec::new();
     for name in names.map_err(|fault| fault_of(fault, limits))? {
         let path = folder.join(&name);

@@ -66,8 +66,8 @@ pub enum ScanFault {
         /// What was found and what to do.
         problem: String,
     },
-    /// The scratch folder failed.
-    #[error("cannot be unpacked: {0}")]
+    /// The server's disk failed.
+    #[error("cannot be unpacked or read: {0}")]
     Scratch(std::io::Error),
 }
 

@@ -1,3 +1,5 @@
+use std::fs::File;
+use std::io::{self, Read, Seek};
 use std::path::Path;
 
 use bytes::Bytes;
@@ -7,20 +9,20 @@ use super::fault::{Part, ScanFault};
 use super::limits::ScanLimits;
 use super::picture::check_picture;
 use super::record::{MeshKind, ScanParts};
-use crate::formats::{Fault, FormatError, LandmarkFile, MaskFile, MeshFile, MeshFormat};
+use crate::formats::{Fault, FormatError, LandmarkFile, MaskFile, MeshFile};
 use crate::job::blobs::Blobs;
 use crate::job::store_error::StoreError;
 use crate::mesh::LandmarkSet;
 use crate::pipeline::Subject;
 use crate::preflight::Inspection;
 
-/// The bytes of a scan's files.
-#[derive(Debug, Clone)]
+/// A scan's files: the mesh to be read a piece at a time, the others as bytes.
+#[derive(Debug)]
 pub struct ScanFiles {
     /// What the mesh's bytes are.
     pub kind: MeshKind,
     /// The mesh, or the zip that holds it.
-    pub mesh: Bytes,
+    pub mesh: File,
     /// The landmarks.
     pub landmarks: Option<Bytes>,
     /// The mask.
@@ -53,7 +55,7 @@ impl ScanFiles {
             }
         }
         let [landmarks, mask, texture] = others;
-        Ok(Self { kind: parts.kind, mesh: blobs.read(parts.mesh).await?, landmarks, mask, texture })
+        Ok(Self { kind: parts.kind, mesh: blobs.open_file(parts.mesh).await?, landmarks, mask, texture })
     }
 
     /// Reads all of them, which takes long: not on an async thread. `scratch` is a folder that a zip is unpacked in.
@@ -84,12 +86,31 @@ impl ScanFiles {
         Ok(ReadScan { file, landmarks, mask })
     }
 
+    /// All bytes of the mesh, or of the zip that holds it.
+    ///
+    /// # Errors
+    /// [`ScanFault::Scratch`].
+    pub fn mesh_bytes(&self) -> Result<Vec<u8>, ScanFault> {
+        let mut bytes = Vec::new();
+        self.mesh_start().and_then(|mut mesh| mesh.read_to_end(&mut bytes)).map_err(ScanFault::Scratch)?;
+        Ok(bytes)
+    }
+
+    fn mesh_start(&self) -> io::Result<&File> {
+        (&self.mesh).rewind()?;
+        Ok(&self.mesh)
+    }
+
     fn mesh_file(&self, limits: &ScanLimits, scratch: &Path) -> Result<MeshFile, ScanFault> {
-        let unreadable = |error| ScanFault::Unreadable { part: Part::Mesh, error };
+        let unreadable = |error: FormatError| match error.fault() {
+            Fault::Unreadable(_) => ScanFault::Scratch(io::Error::other(error)),
+            _ => ScanFault::Unreadable { part: Part::Mesh, error },
+        };
+        let mesh = self.mesh_start().map_err(ScanFault::Scratch)?;
         let extension = match self.kind {
             MeshKind::Zip => {
                 let folder = tempfile::tempdir_in(scratch).map_err(ScanFault::Scratch)?;
-                let mesh = unpack(&self.mesh, folder.path(), limits)?;
+                let mesh = unpack(mesh, folder.path(), limits)?;
                 let name = mesh.file_name().unwrap_or_default().to_owned();
                 let mut file = MeshFile::read(&mesh).map_err(|error| unreadable(error.of_file(name)))?;
                 // The folder's path means nothing to whoever sent the zip.
@@ -99,12 +120,8 @@ impl ScanFiles {
             }
             kind => kind.extension(),
         };
-        let Some(format) = MeshFormat::sniff(&self.mesh, Some(extension)) else {
-            let start = String::from_utf8_lossy(&self.mesh[..self.mesh.len().min(32)]);
-            let start = start.escape_default().to_string();
-            return Err(unreadable(FormatError::from(Fault::UnknownFormat { start })));
-        };
-        MeshFile::parse(&self.mesh, format).map_err(unreadable)
+        let length = mesh.metadata().map_err(ScanFault::Scratch)?.len();
+        MeshFile::read_from(mesh, length, Some(extension)).map_err(unreadable)
     }
 }
 

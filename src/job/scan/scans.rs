@@ -212,8 +212,6 @@ impl Scans {
         let (limits, scratch) = (self.limits, self.scratch.clone());
         let work = move || {
             let read = files.read(&limits, &scratch)?;
-            // The report stands beside the mesh, not beside the file's bytes too.
-            drop(files);
             let mut report = serde_json::to_value(read.inspect()).unwrap_or_default();
             report["warnings"] = read.file.warnings.into();
             Ok(report)
