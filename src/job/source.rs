@@ -17,7 +17,6 @@ pub(super) struct Source {
     from: From,
 }
 
-#[expect(clippy::large_enum_variant, reason = "one lives at a time, and not for long")]
 enum From {
     Prepared(Arc<Prepared>),
     Read(Arc<Subject>),
