@@ -196,14 +196,13 @@ async fn sniff(app: &App, mesh: &Kept, file_name: Option<&str>) -> Result<Option
     if beginning.starts_with(b"PK\x03\x04") {
         return Ok(Some(MeshKind::Zip));
     }
-    Ok(match MeshFormat::sniff(&beginning, mesh.info.size, None) {
-        Some(MeshFormat::Gltf) if beginning.starts_with(b"glTF") => Some(MeshKind::Glb),
-        Some(MeshFormat::Gltf) => Some(MeshKind::Gltf),
-        Some(MeshFormat::Obj) => Some(MeshKind::Obj),
-        Some(MeshFormat::Ply) => Some(MeshKind::Ply),
-        Some(MeshFormat::Stl) => Some(MeshKind::Stl),
-        None => None,
-    })
+    Ok(MeshFormat::sniff(&beginning, mesh.info.size, None).map(|format| match format {
+        MeshFormat::Gltf if beginning.starts_with(b"glTF") => MeshKind::Glb,
+        MeshFormat::Gltf => MeshKind::Gltf,
+        MeshFormat::Obj => MeshKind::Obj,
+        MeshFormat::Ply => MeshKind::Ply,
+        MeshFormat::Stl => MeshKind::Stl,
+    }))
 }
 
 fn unknown_mesh(found: Option<&str>) -> Problem {
