@@ -1,3 +1,5 @@
+use std::borrow::Cow;
+
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
@@ -89,17 +91,28 @@ pub struct Distances {
 impl Fidelity {
     /// Measures `mesh` against `scan`.
     pub fn of(scan: &TriangleMesh, mesh: &TriangleMesh) -> Self {
-        let quality = ScanQuality::of(scan);
+        Self::of_part(scan, |_| true, mesh)
+    }
+
+    /// Measures `mesh` against the triangles of `scan` that are data. What of the mesh lies nearest to the others is not over
+    /// the scan. If none are, all are.
+    pub fn of_part(scan: &TriangleMesh, is_data: impl Fn(&[u32; 3]) -> bool, mesh: &TriangleMesh) -> Self {
+        let whole = scan;
+        let scan = part(whole, &is_data);
+        let quality = ScanQuality::of(&scan);
         let spacing = Spacing::of(mesh);
         let meeting = self_intersections(mesh.positions(), mesh.triangles());
-        let space = UnitSpace::of(scan);
-        let (scan, mesh) = (Surface::new(scan, &space), Surface::new(mesh, &space));
-        let border = Border::of(scan.positions.len(), scan.triangles);
+        let space = UnitSpace::of(&scan);
+        let is_whole = matches!(scan, Cow::Borrowed(_));
+        let [scan, whole, mesh] = [&*scan, whole, mesh].map(|mesh| Surface::new(mesh, &space));
+        let border = Border::of(whole.positions.len(), whole.triangles);
+        let counts =
+            |hit: &Hit| (is_whole || is_data(&whole.triangles[hit.triangle as usize])) && !border.holds(hit);
         let end = Border::of(mesh.positions.len(), mesh.triangles);
         let reach = if is_patch(&mesh) { PATCH_REACH * PATCH_REACH } else { f32::INFINITY };
         let is_over = |hit: &Hit| !end.holds(hit) && hit.distance_squared <= reach;
         let onto_mesh = Pairs::between(&scan, &mesh, SAMPLES, SEEDS[0], is_over);
-        let onto_scan = Pairs::between(&mesh, &scan, SAMPLES, SEEDS[1], |hit| !border.holds(hit));
+        let onto_scan = Pairs::between(&mesh, &whole, SAMPLES, SEEDS[1], counts);
         let normal = (mean(&onto_mesh.turns) + mean(&onto_scan.turns)) / 2.0;
         let residual = |squared: f32| f64::from(squared).sqrt() * space.radius;
         let tolerance = (TOLERANCE * quality.radius).max(NOISE_TOLERANCE * quality.noise);
@@ -119,7 +132,7 @@ impl Fidelity {
             scan_to_mesh: Distances::of_squares(&onto_mesh.distances, space.radius),
             mesh_to_scan: Distances::of_squares(&onto_scan.distances, space.radius),
             normal: normal.is_finite().then_some(normal),
-            flipped: flipped_share(&mesh, &scan, &border),
+            flipped: flipped_share(&mesh, &whole, counts),
             sliver: sliver_share(&mesh),
             self_intersecting: meeting.triangles.len() as f64 / mesh.triangles.len() as f64,
             self_intersections: meeting.pairs,
@@ -131,6 +144,15 @@ impl Fidelity {
                 .collect(),
         }
     }
+}
+
+/// The triangles of a scan that are data; all where these are no mesh.
+fn part(scan: &TriangleMesh, is_data: impl Fn(&[u32; 3]) -> bool) -> Cow<'_, TriangleMesh> {
+    let data: Vec<[u32; 3]> = scan.triangles().iter().copied().filter(|corners| is_data(corners)).collect();
+    if data.len() == scan.triangles().len() {
+        return Cow::Borrowed(scan);
+    }
+    TriangleMesh::new(scan.positions().to_vec(), data).map_or(Cow::Borrowed(scan), Cow::Owned)
 }
 
 /// Whether a surface's opening is more than a fifth of it, as its area vectors say, which those of a closed one balance:
@@ -176,6 +198,23 @@ mod tests {
         assert_eq!((fidelity.overlap.scan, fidelity.overlap.mesh), (0.0, 0.0));
         assert_eq!(fidelity.residuals.len(), 10242);
         assert!(fidelity.residuals.iter().all(|d| (d - 0.5).abs() < 0.02));
+    }
+
+    #[test]
+    fn what_lies_nearest_to_what_is_no_data_is_not_over_the_scan() {
+        // A shell within another, of which the outer one is data.
+        let (outer, inner) = (sphere(10.0), sphere(5.0));
+        let count = outer.positions().len() as u32;
+        let positions = [outer.positions(), inner.positions()].concat();
+        let further = inner.triangles().iter().map(|corners| corners.map(|corner| corner + count));
+        let triangles: Vec<[u32; 3]> = outer.triangles().iter().copied().chain(further).collect();
+        let scan = TriangleMesh::new(positions, triangles).unwrap();
+        let outside = |corners: &[u32; 3]| corners[0] < count;
+        let fidelity = Fidelity::of_part(&scan, outside, &scan);
+        assert!((fidelity.overlap.mesh_over_scan - 0.8).abs() < 0.01, "{:?}", fidelity.overlap);
+        assert!(fidelity.mesh_to_scan.unwrap().max < 1e-3 && fidelity.flipped == 0.0);
+        let nothing = Fidelity::of_part(&scan, |_| false, &scan);
+        assert_eq!(nothing.overlap.mesh_over_scan, 1.0);
     }
 
     #[test]

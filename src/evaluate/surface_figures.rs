@@ -69,7 +69,7 @@ pub fn surface_figures(scan: &TriangleMesh, mesh: &TriangleMesh, open: bool) -> 
         top20: onto_mesh.means_at_the_top(&felt, 0.8),
         top5: onto_mesh.means_at_the_top(&felt, 0.95),
         hausdorff: largest.sqrt(),
-        flipped: flipped_share(&mesh, &scan, &border),
+        flipped: flipped_share(&mesh, &scan, |hit| !border.holds(hit)),
         sliver: sliver_share(&mesh),
         vertices: mesh.positions.len(),
         triangles: mesh.triangles.len(),
@@ -122,13 +122,14 @@ fn triangle_curvature(surface: &Surface) -> Vec<f64> {
     surface.triangles.iter().map(|t| t.iter().map(|&v| at_vertex[v as usize]).sum::<f64>() / 3.0).collect()
 }
 
-pub(super) fn flipped_share(mesh: &Surface, scan: &Surface, border: &Border) -> f64 {
+/// The share of the mesh's triangles that face away from the scan, where the nearest point `counts`.
+pub(super) fn flipped_share(mesh: &Surface, scan: &Surface, counts: impl Fn(&Hit) -> bool) -> f64 {
     let count = mesh.triangles.len();
     let centres: Vec<DVec3> =
         (0..count as u32).map(|t| mesh.corners(t).iter().sum::<DVec3>() / 3.0).collect();
     let hits = scan.closest(&centres);
     let flipped = |&(triangle, hit): &(usize, &Hit)| {
-        mesh.normal(triangle as u32).dot(scan.normal(hit.triangle)) < 0.0 && !border.holds(hit)
+        mesh.normal(triangle as u32).dot(scan.normal(hit.triangle)) < 0.0 && counts(hit)
     };
     hits.iter().enumerate().filter(flipped).count() as f64 / count as f64
 }

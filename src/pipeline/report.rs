@@ -75,7 +75,7 @@ impl ScanReport {
             verdict: Verdict::Pass,
             reasons: Vec::new(),
             precheck: precheck.clone(),
-            fidelity: Fidelity::of(&data(subject), &matched),
+            fidelity: Fidelity::of_part(&subject.mesh, |corners| is_data(subject, corners), &matched),
             coverage: coverage(&matched, confidence),
             landmark_mean: landmarks.values().sum::<f64>() / landmarks.len().max(1) as f64,
             landmarks,
@@ -109,11 +109,9 @@ fn only(mesh: &TriangleMesh, triangles: Vec<[u32; 3]>) -> Cow<'_, TriangleMesh> 
     part.map_or(Cow::Borrowed(mesh), Cow::Owned)
 }
 
-/// A scan without what its mask leaves out.
-fn data(subject: &Subject) -> Cow<'_, TriangleMesh> {
-    let counts = |i: u32| subject.mask.as_ref().is_none_or(|mask| mask[i as usize] > 0.0);
-    let counted = |corners: &&[u32; 3]| corners.iter().all(|&i| counts(i));
-    only(&subject.mesh, subject.mesh.triangles().iter().filter(counted).copied().collect())
+/// Whether the scan's mask leaves a triangle's corners in.
+fn is_data(subject: &Subject, corners: &[u32; 3]) -> bool {
+    subject.mask.as_ref().is_none_or(|mask| corners.iter().all(|&i| mask[i as usize] > 0.0))
 }
 
 /// The share of a mesh's area around vertices of a confidence above a half.
