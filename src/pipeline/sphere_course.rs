@@ -232,7 +232,7 @@ impl SphereCourse {
 
     /// The state of a scan before a round, or when all are over, from its shape in unit space.
     fn after(&self, round: usize, scan: &Aligned, mut shape: Vec<Vec3A>) -> ScanState {
-        let Aligned { scan, .. } = scan;
+        let Aligned { scan, landmarks, .. } = scan;
         let settings = &self.settings.groupwise;
         if round == settings.rounds {
             let sphere = Sphere::of_level(Icosphere::level_of(shape.len()).unwrap_or(0));
@@ -249,7 +249,7 @@ impl SphereCourse {
         ScanState::Shaped(Contribution {
             known: known(&sphere.connectivity, scan, &shape),
             weight: trust(&sphere, scan, &shape),
-            need: if round > 0 { need(&sphere, scan, &shape, settings) } else { Vec::new() },
+            need: if round > 0 { need(&sphere, scan, landmarks, &shape, settings) } else { Vec::new() },
             shape,
         })
     }
