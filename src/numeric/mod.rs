@@ -1,6 +1,7 @@
 //! Numbers without geometry: sparse solves, rotations between point sets, the optimiser. Layer 1.
 
 mod adam_uniform;
+mod block_matrix;
 mod cholesky;
 mod dissection;
 mod elimination;
@@ -13,6 +14,7 @@ mod random;
 mod supernodal;
 
 pub use adam_uniform::AdamUniform;
+pub use block_matrix::{BlockMatrix, squared};
 pub use cholesky::{NotPositiveDefinite, SparseCholesky, SymmetricMatrix};
 use dissection::Dissection;
 pub use elimination::Elimination;

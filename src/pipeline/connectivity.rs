@@ -1,10 +1,10 @@
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock};
 
-use glam::Vec3A;
+use glam::{Mat3A, Vec3A};
 
 use crate::mesh::{Rim, Topology};
-use crate::numeric::{Elimination, SparseCholesky, SymmetricMatrix, once};
+use crate::numeric::{BlockMatrix, Elimination, SparseCholesky, SymmetricMatrix, once};
 use crate::spatial::SurfaceWalk;
 
 /// The triangles of a template with what is made for them once and kept: topology, elimination, factors.
@@ -91,6 +91,22 @@ impl Connectivity {
         for k in 0..3 {
             matrix.diagonal[corners[k] as usize] += entry(k, k);
             matrix.edges[edges[k] as usize] += entry(k, (k + 1) % 3);
+        }
+    }
+
+    /// Adds a symmetric matrix of three rows, given by its entries, each times `block`, to those of a triangle's corners.
+    pub fn add_blocks(
+        &self,
+        matrix: &mut BlockMatrix,
+        triangle: u32,
+        block: Mat3A,
+        entry: impl Fn(usize, usize) -> f32,
+    ) {
+        let corners = self.topology.triangles[triangle as usize];
+        let edges = self.triangle_edges[triangle as usize];
+        for k in 0..3 {
+            matrix.diagonal[corners[k] as usize] += block * entry(k, k);
+            matrix.edges[edges[k] as usize] += block * entry(k, (k + 1) % 3);
         }
     }
 }

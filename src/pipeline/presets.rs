@@ -150,6 +150,6 @@ fn groupwise() -> GroupwiseSettings {
         fall_beyond: 0.02,
         film_stretch: 6.0,
         plane: 0.9,
-        settle: SettleSettings { iterations: 6, normals: 0.25, stiffness: 0.003 },
+        settle: SettleSettings { iterations: 6, normals: 0.12, stiffness: 0.003 },
     }
 }

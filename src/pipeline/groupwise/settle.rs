@@ -1,10 +1,10 @@
-use glam::Vec3A;
+use glam::{Mat3A, Vec3, Vec3A};
 use rayon::prelude::*;
 
 use super::RestShape;
-use crate::mesh::{Normals, mean_edge_lengths};
-use crate::numeric::{SolveBuffer, SparseCholesky, SymmetricMatrix};
-use crate::pipeline::{ScanSurface, SettleSettings, SurfaceSample};
+use crate::mesh::{Normals, Topology};
+use crate::numeric::{BlockMatrix, SolveBuffer, SparseCholesky, SymmetricMatrix, squared};
+use crate::pipeline::{Connectivity, ScanSurface, SettleSettings, SurfaceSample};
 use crate::spatial::{Hit, SurfaceIndex};
 
 /// Samples farther than this from the template, in unit space, belong to what it has not entered.
@@ -13,12 +13,19 @@ const REACH: f32 = 0.02;
 /// Cosine between the normals of sample and template below which they do not belong together.
 const LEAST_COSINE: f32 = 0.3;
 
-/// The farthest that a vertex moves, as a share of the mean length of its edges: a mesh that follows its scan needs less,
-/// and where it lies in a tangle it stays there rather than being drawn through itself.
-const FARTHEST: f32 = 0.15;
+/// The farthest that a vertex moves, as a share of its shortest edge: a mesh that follows its scan needs less, and where it
+/// lies in a tangle, of edges both long and short, it stays there rather than being drawn through itself.
+const FARTHEST: f32 = 0.5;
 
 /// Weight of a step against the data, so that vertices without any stay.
-const INERTIA: f64 = 1e-3;
+const INERTIA: f32 = 1e-3;
+
+/// Weight of a step along the surface against the data, so that what corresponds stays where it is; less of it brings lids and
+/// lips nearer to their creases, and corresponding points apart.
+const SLIDING: f32 = 0.2;
+
+/// Residual of a step, as a share of its forces, and the most that is spent on it.
+const ACCURACY: (f64, usize) = (1e-2, 30);
 
 /// Moves a registered shape `[N, 3]` to where its triangles, not its vertices, lie closest to the scan.
 ///
@@ -26,8 +33,7 @@ const INERTIA: f64 = 1e-3;
 /// pull the triangles that they lie nearest to, along their own normals n_s, and turn them:
 /// E(d) = sum_s (n_s . (x_s - B_s p))^2 + l_t^2 |n_s - n_t(p)|^2 + mu sum_edges |d_i - d_j|^2, d the step from p and l_t a
 /// share of the triangle's size.
-/// Steps of Gauss and Newton bounded from above by a matrix that is alike in x, y and z, in which what slides along the surface
-/// moves little, so that what corresponds stays where it is. `index` is of the triangles, wherever they were last.
+/// Steps of Gauss and Newton, held back along the surface. `index` is of the triangles, wherever they were last.
 pub fn settle(
     rest: &RestShape,
     scan: &ScanSurface,
@@ -43,15 +49,24 @@ pub fn settle(
     let mut last = nearest(scan, index);
     let mut buffer = SolveBuffer::default();
     let before = p.to_vec();
-    let lengths = mean_edge_lengths(topology, p);
+    let farthest = farthest(topology, p);
     for _ in 0..settings.iterations {
         let settling = Settling { rest, settings, p, normals: &Normals::new(topology, p) };
         let matches = settling.matches(scan, &mut last);
         let Some(step) = settling.step(&matches, &mut buffer) else { return };
         for (i, p) in p.iter_mut().enumerate() {
-            *p = before[i] + (*p + step[i] - before[i]).clamp_length_max(FARTHEST * lengths[i]);
+            *p = before[i] + (*p + step[i] - before[i]).clamp_length_max(farthest[i]);
         }
     }
+}
+
+/// How far each vertex may move `[N]`.
+fn farthest(topology: &Topology, p: &[Vec3A]) -> Vec<f32> {
+    let shortest = |i: usize| {
+        let ring = topology.neighbours.row(i).iter();
+        ring.map(|&j| p[i].distance(p[j as usize])).reduce(f32::min).unwrap_or(0.0)
+    };
+    (0..p.len()).map(|i| FARTHEST * shortest(i)).collect()
 }
 
 /// The triangle that each sample `[S]` lies nearest to, or [`NOWHERE`].
@@ -100,39 +115,35 @@ impl Settling<'_> {
     }
 
     fn step(&self, matches: &[Match], buffer: &mut SolveBuffer) -> Option<Vec<Vec3A>> {
-        let Settling { rest, settings, p, .. } = self;
-        let topology = &rest.connectivity.topology;
-        let stiffness = f64::from(settings.stiffness);
-        let degree = |i: usize| topology.neighbours.row(i).len() as f64;
-        let mut matrix = SymmetricMatrix {
-            diagonal: (0..p.len()).map(|i| INERTIA + stiffness * degree(i)).collect(),
-            edges: vec![-stiffness; topology.edges.len()],
-        };
+        let Settling { rest, settings, p, normals } = self;
+        let mut system = System::new(&rest.connectivity, settings.stiffness);
+        for (i, normal) in normals.vertices.iter().enumerate() {
+            system.hold(i, *normal);
+        }
         let mut force = vec![Vec3A::ZERO; p.len()];
-        self.add_distances(matches, &mut force, &mut matrix);
-        self.add_turns(matches, &mut force, &mut matrix);
+        self.add_distances(matches, &mut force, &mut system);
+        self.add_turns(matches, &mut force, &mut system);
         // Triangles that are only partly for the scan do not take the rest of them along.
         force.iter_mut().enumerate().for_each(|(i, force)| *force *= rest.takes(i));
-        let system = SparseCholesky::new(rest.connectivity.elimination(), &matrix).ok()?;
-        system.solve(&mut force, buffer);
+        system.solve(&mut force, buffer)?;
         Some(force)
     }
 
-    /// The first term: its negative half gradient, and a bound of its half Hessian.
-    fn add_distances(&self, matches: &[Match], force: &mut [Vec3A], matrix: &mut SymmetricMatrix) {
-        let connectivity = &self.rest.connectivity;
+    /// The first term: its negative half gradient and its half Hessian.
+    fn add_distances(&self, matches: &[Match], force: &mut [Vec3A], system: &mut System) {
+        let triangles = &self.rest.connectivity.topology.triangles;
         for Match { sample, hit, weight } in matches {
             let off = sample.normal * (sample.normal.dot(sample.point - hit.point) * weight);
-            let corners = connectivity.topology.triangles[hit.triangle as usize];
-            for (&i, w) in corners.iter().zip(hit.weights) {
+            let w = hit.weights;
+            for (&i, w) in triangles[hit.triangle as usize].iter().zip(w) {
                 force[i as usize] += off * w;
             }
-            connectivity.add_point(matrix, hit.triangle, hit.weights, f64::from(*weight));
+            system.add(hit.triangle, sample.normal, |j, k| weight * w[j] * w[k]);
         }
     }
 
     /// The same of the second.
-    fn add_turns(&self, matches: &[Match], force: &mut [Vec3A], matrix: &mut SymmetricMatrix) {
+    fn add_turns(&self, matches: &[Match], force: &mut [Vec3A], system: &mut System) {
         // How the normals of each triangle's samples differ from its own, and how much they weigh.
         let mut turns = vec![(Vec3A::ZERO, 0f32); self.rest.connectivity.topology.triangles.len()];
         for Match { sample, hit, weight } in matches {
@@ -143,22 +154,14 @@ impl Settling<'_> {
         for (triangle, (turn, weight)) in
             turns.into_iter().enumerate().filter(|(_, (_, weight))| *weight > 0.0)
         {
-            self.add_turn(triangle as u32, turn, weight, force, matrix);
+            self.add_turn(triangle as u32, turn, weight, force, system);
         }
     }
 
     /// One triangle's part: a step d turns it by -sum_j g_j (d_j . n), g_j the gradients of its barycentric
     /// coordinates.
-    fn add_turn(
-        &self,
-        triangle: u32,
-        turn: Vec3A,
-        weight: f32,
-        force: &mut [Vec3A],
-        matrix: &mut SymmetricMatrix,
-    ) {
-        let connectivity = &self.rest.connectivity;
-        let corners = connectivity.topology.triangles[triangle as usize];
+    fn add_turn(&self, triangle: u32, turn: Vec3A, weight: f32, force: &mut [Vec3A], system: &mut System) {
+        let corners = self.rest.connectivity.topology.triangles[triangle as usize];
         let [a, b, c] = corners.map(|i| self.p[i as usize]);
         let area = (b - a).cross(c - a);
         let normal = area.normalize_or_zero();
@@ -167,9 +170,52 @@ impl Settling<'_> {
         for (i, gradient) in corners.into_iter().zip(gradients) {
             force[i as usize] -= normal * (share * turn.dot(gradient));
         }
-        let between =
-            |j: usize, k: usize| f64::from(share * weight) * f64::from(gradients[j].dot(gradients[k]));
-        connectivity.add_products(matrix, triangle, between);
+        system.add(triangle, normal, |j, k| share * weight * gradients[j].dot(gradients[k]));
+    }
+}
+
+/// The matrix of a step, and one that is no smaller and alike in x, y and z, whose factor is soon made and leads to it.
+struct System<'a> {
+    connectivity: &'a Connectivity,
+    blocks: BlockMatrix,
+    bound: SymmetricMatrix,
+}
+
+impl<'a> System<'a> {
+    fn new(connectivity: &'a Connectivity, stiffness: f32) -> Self {
+        let topology = &connectivity.topology;
+        let degree = |i: usize| topology.neighbours.row(i).len() as f32;
+        let diagonal: Vec<f32> =
+            (0..topology.vertex_count()).map(|i| INERTIA + stiffness * degree(i)).collect();
+        let edges = vec![-stiffness; topology.edges.len()];
+        let alike = |values: &[f32]| -> Vec<Mat3A> {
+            values.iter().map(|&value| Mat3A::from_diagonal(Vec3::splat(value))).collect()
+        };
+        let double = |values: Vec<f32>| values.into_iter().map(f64::from).collect();
+        Self {
+            connectivity,
+            blocks: BlockMatrix { diagonal: alike(&diagonal), edges: alike(&edges) },
+            bound: SymmetricMatrix { diagonal: double(diagonal), edges: double(edges) },
+        }
+    }
+
+    /// Holds a vertex of unit normal n back along the surface.
+    fn hold(&mut self, vertex: usize, n: Vec3A) {
+        self.blocks.diagonal[vertex] += (Mat3A::IDENTITY - squared(n)) * SLIDING;
+        self.bound.diagonal[vertex] += f64::from(SLIDING);
+    }
+
+    /// Adds a symmetric matrix of three rows, given by its entries, for what a triangle's corners do along a unit vector.
+    fn add(&mut self, triangle: u32, along: Vec3A, entry: impl Fn(usize, usize) -> f32) {
+        self.connectivity.add_blocks(&mut self.blocks, triangle, squared(along), &entry);
+        self.connectivity.add_products(&mut self.bound, triangle, |j, k| f64::from(entry(j, k)));
+    }
+
+    /// Forces become the step they lead to, `[N, 3]`.
+    fn solve(&self, force: &mut [Vec3A], buffer: &mut SolveBuffer) -> Option<()> {
+        let near = SparseCholesky::new(self.connectivity.elimination(), &self.bound).ok()?;
+        self.blocks.solve(&self.connectivity.topology, &near, force, ACCURACY, buffer);
+        Some(())
     }
 }
 
@@ -235,11 +281,10 @@ mod tests {
         let settling = Settling { rest: &rest, settings: &SETTINGS, p: &p, normals: &normals };
         let matches = settling.matches(&scan, &mut last.clone());
         assert!(matches.len() > 10_000);
-        let mut matrix =
-            SymmetricMatrix { diagonal: vec![0.0; p.len()], edges: vec![0.0; topology.edges.len()] };
+        let mut system = System::new(&rest.connectivity, 0.0);
         let mut force = vec![Vec3A::ZERO; p.len()];
-        settling.add_distances(&matches, &mut force, &mut matrix);
-        settling.add_turns(&matches, &mut force, &mut matrix);
+        settling.add_distances(&matches, &mut force, &mut system);
+        settling.add_turns(&matches, &mut force, &mut system);
         let half_gradient: Vec<Vec3A> = force.iter().map(|f| -*f).collect();
         let error = directional_error(&p, &half_gradient, 1e-4, 5, |p| {
             let normals = Normals::new(topology, p);
