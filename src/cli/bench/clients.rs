@@ -16,7 +16,7 @@ use tokio::sync::oneshot;
 use tokio::time::MissedTickBehavior;
 use tokio_util::sync::CancellationToken;
 
-use super::clock::row;
+use super::clock::{median, row};
 use super::sculpt;
 use super::service::Bed;
 
@@ -27,6 +27,8 @@ const REGISTRATIONS: usize = 2;
 const SCANS: usize = 3;
 /// Triangles of a scan.
 const TRIANGLES: usize = 60_000;
+/// How often that is done, without clients and with them in turn.
+const ROUNDS: usize = 3;
 /// How long it goes on at most.
 const LONGEST: Duration = Duration::from_secs(300);
 
@@ -55,17 +57,20 @@ pub fn clients(count: usize) -> anyhow::Result<()> {
         let members = bed.upload(&heads).await?;
         // The first time reads the scans.
         together(&bed, &members).await?.wait(&bed).await?;
-        let alone = together(&bed, &members).await?.wait(&bed).await?;
-        let run = together(&bed, &members).await?;
-        let ending = CancellationToken::new();
-        let paths: Vec<String> = run.ids.iter().map(|id| format!("/v1/registrations/{id}")).collect();
-        let crowd = of_clients.spawn(crowd(count, address, paths, ending.clone()));
-        let crowded = run.wait(&bed).await?;
-        ending.cancel();
-        let mut latencies = crowd.await??;
+        let mut found = Found::default();
+        for _ in 0..ROUNDS {
+            found.alone.push(together(&bed, &members).await?.wait(&bed).await?);
+            let run = together(&bed, &members).await?;
+            let ending = CancellationToken::new();
+            let paths: Vec<String> = run.ids.iter().map(|id| format!("/v1/registrations/{id}")).collect();
+            let crowd = of_clients.spawn(crowd(count, address, paths, ending.clone()));
+            found.crowded.push(run.wait(&bed).await?);
+            ending.cancel();
+            found.latencies.extend(crowd.await??);
+        }
         drop(stop);
         server.await?;
-        tell(count, alone, crowded, &mut latencies);
+        found.tell(count);
         anyhow::Ok(())
     })?;
     of_clients.shutdown_background();
@@ -178,20 +183,31 @@ fn request(address: SocketAddr, path: &str) -> anyhow::Result<Request<Empty<Byte
     Ok(Request::get(path).header("host", address.to_string()).body(Empty::new())?)
 }
 
-fn tell(count: usize, alone: Duration, crowded: Duration, latencies: &mut [Duration]) {
-    latencies.sort_unstable();
-    let at = |share: f64| latencies[((latencies.len() - 1) as f64 * share) as usize].as_secs_f64() * 1e3;
-    let loss = 100.0 * (1.0 - alone.as_secs_f64() / crowded.as_secs_f64());
-    row(&format!("{REGISTRATIONS} registrations of {SCANS} scans, alone"), vec![alone]);
-    row(&format!("- with {count} clients: {loss:.1} % of the work's speed is lost"), vec![crowded]);
-    if latencies.is_empty() {
-        return;
+/// How long the registrations took in each round, and all answers.
+#[derive(Default)]
+struct Found {
+    alone: Vec<Duration>,
+    crowded: Vec<Duration>,
+    latencies: Vec<Duration>,
+}
+
+impl Found {
+    fn tell(mut self, count: usize) {
+        let loss = 100.0 * (1.0 - median(&self.alone).as_secs_f64() / median(&self.crowded).as_secs_f64());
+        row(&format!("{REGISTRATIONS} registrations of {SCANS} scans, alone"), &self.alone);
+        row(&format!("- with {count} clients: {loss:.1} % of the work's speed is lost"), &self.crowded);
+        if self.latencies.is_empty() {
+            return;
+        }
+        self.latencies.sort_unstable();
+        let last = self.latencies.len() - 1;
+        let at = |share: f64| self.latencies[(last as f64 * share) as usize].as_secs_f64() * 1e3;
+        println!(
+            "\n{} answers: median {:.1} ms, p99 {:.1} ms, longest {:.1} ms",
+            self.latencies.len(),
+            at(0.5),
+            at(0.99),
+            at(1.0)
+        );
     }
-    println!(
-        "\n{} answers: median {:.1} ms, p99 {:.1} ms, longest {:.1} ms",
-        latencies.len(),
-        at(0.5),
-        at(0.99),
-        at(1.0)
-    );
 }

@@ -31,7 +31,7 @@ impl Clock {
             work()?;
             times.push(start.elapsed());
         }
-        row(what, times);
+        row(what, &times);
         Ok(())
     }
 
@@ -48,15 +48,21 @@ impl Clock {
             work();
             start.elapsed() / count
         });
-        row(what, times.collect());
+        row(what, &times.collect::<Vec<_>>());
     }
 }
 
 /// Prints one row.
-pub fn row(what: &str, mut times: Vec<Duration>) {
+pub fn row(what: &str, times: &[Duration]) {
+    let fastest = times.iter().min().copied().unwrap_or_default();
+    println!("| {what} | {} | {} | {} |", shown(median(times)), shown(fastest), times.len());
+}
+
+/// The median; of an even number, the longer one in the middle.
+pub fn median(times: &[Duration]) -> Duration {
+    let mut times = times.to_vec();
     times.sort_unstable();
-    let (median, fastest) = (times[times.len() / 2], times[0]);
-    println!("| {what} | {} | {} | {} |", shown(median), shown(fastest), times.len());
+    times.get(times.len() / 2).copied().unwrap_or_default()
 }
 
 fn shown(time: Duration) -> String {

@@ -58,9 +58,9 @@ fn losses(clock: &Clock, renderer: &mut dyn Renderer, level: u32, side: u32) -> 
         whole.push(time);
         passes.iter_mut().zip(times).for_each(|((_, all), (_, time))| all.push(time));
     }
-    row(&format!("{name}, whole"), whole);
+    row(&format!("{name}, whole"), &whole);
     for (pass, times) in passes {
-        row(&format!("{name}, {pass}"), times);
+        row(&format!("{name}, {pass}"), &times);
     }
     Ok(())
 }

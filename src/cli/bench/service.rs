@@ -40,9 +40,9 @@ pub fn collection(count: usize, triangles: usize) -> anyhow::Result<()> {
             memory::peak().map_or("memory unknown".to_owned(), |peak| format!("{peak:.0} MiB at most"));
         let name =
             format!("{count} scans as jobs of the service, upload to results, 10242 vertices ({peak})");
-        row(&name, vec![start.elapsed()]);
+        row(&name, &[start.elapsed()]);
         for (stage, (steps, seconds)) in bed.jobs.figures().await?.stages {
-            row(&format!("- of it {stage}, {steps} steps"), vec![Duration::from_secs_f64(seconds)]);
+            row(&format!("- of it {stage}, {steps} steps"), &[Duration::from_secs_f64(seconds)]);
         }
         Ok(())
     })
@@ -70,7 +70,7 @@ pub fn soak(registrations: usize) -> anyhow::Result<()> {
                 memory::resident().map_or("memory unknown".to_owned(), |now| format!("{now:.0} MiB"));
             row(
                 &format!("after {done} small registrations: {resident}; each"),
-                vec![start.elapsed() / some as u32],
+                &[start.elapsed() / some as u32],
             );
         }
         Ok(())

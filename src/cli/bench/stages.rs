@@ -72,12 +72,9 @@ pub fn collection(path: &Path) -> anyhow::Result<()> {
     let outcome = register_collection(path, &output.0, None, Outputs::GLB, &settings)?;
     let elapsed = start.elapsed();
     let peak = memory::peak().map_or("memory unknown".to_owned(), |peak| format!("{peak:.0} MiB at most"));
-    row(
-        &format!("{} scans, read to written, 10242 vertices ({peak})", outcome.subjects.len()),
-        vec![elapsed],
-    );
+    row(&format!("{} scans, read to written, 10242 vertices ({peak})", outcome.subjects.len()), &[elapsed]);
     for (stage, seconds) in &outcome.report.seconds {
-        row(&format!("- of it {stage}"), vec![std::time::Duration::from_secs_f64(*seconds)]);
+        row(&format!("- of it {stage}"), &[std::time::Duration::from_secs_f64(*seconds)]);
     }
     Ok(())
 }

@@ -40,7 +40,7 @@ pub fn upload(triangles: usize) -> anyhow::Result<()> {
         "upload of {triangles} triangles: {taken:.0} MiB more than before ({before:.0}), {:.2} times the parsed mesh ({parsed:.0})",
         taken / parsed
     );
-    row(&name, vec![took]);
+    row(&name, &[took]);
     Ok(())
 }
 
