@@ -39,7 +39,8 @@ impl Settings {
                 register: coarse_to_fine(level.min(4), 150),
                 from_head: true,
                 audit_weights: false,
-                groupwise: groupwise(),
+                // With few vertices lips that were drawn flat do not grow anew.
+                groupwise: GroupwiseSettings { film_share: if level > 4 { 0.3 } else { 0.4 }, ..groupwise() },
                 transfer: transfer(),
             },
         })
@@ -125,15 +126,15 @@ fn level(level: u32, iterations: usize) -> LevelSettings {
 
 /// A template that is a face begins nearer: six iterations in place of four bring twelve scans .015 mm nearer to each other.
 fn transfer() -> GroupwiseSettings {
-    GroupwiseSettings { iterations: 4, ..groupwise() }
+    GroupwiseSettings { rounds: 2, iterations: 4, ..groupwise() }
 }
 
 fn groupwise() -> GroupwiseSettings {
     GroupwiseSettings {
-        rounds: 2,
+        rounds: 3,
         curvature_power: 0.67,
         need_smoothing: 2.0,
-        most_need: 10.0,
+        most_need: 2.0,
         phases: 12,
         iterations: 12,
         stiffness: [1000.0, 0.05],
@@ -149,6 +150,7 @@ fn groupwise() -> GroupwiseSettings {
         own_share: 0.3,
         fall_beyond: 0.02,
         film_stretch: 6.0,
+        film_share: 0.3,
         plane: 0.9,
         settle: SettleSettings { iterations: 6, normals: 0.12, stiffness: 0.003 },
     }

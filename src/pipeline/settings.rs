@@ -135,7 +135,7 @@ pub struct GroupwiseSettings {
     pub curvature_power: f32,
     /// Diffusion of the need for vertices.
     pub need_smoothing: f64,
-    /// Most vertices a place may draw, relative to the median.
+    /// Most vertices a place may draw in a round, relative to the median.
     pub most_need: f32,
     /// Phases of a round, from stiff to soft.
     pub phases: usize,
@@ -167,6 +167,10 @@ pub struct GroupwiseSettings {
     pub fall_beyond: f32,
     /// Where a member's area is more than this many times the mean's, the mean is drawn flat.
     pub film_stretch: f32,
+    /// Where that film ends: the less, the more of what is around it is drawn flat with it; zero, as files from before have it,
+    /// leaves its edge as ragged as it is found.
+    #[serde(default)]
+    pub film_share: f32,
     /// Share of a match's pull along the scan's normal only: 1 lets the template slide freely.
     pub plane: f32,
     /// How the shape settles on the scan at the end of a round.

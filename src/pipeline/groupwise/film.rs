@@ -2,11 +2,14 @@ use glam::Vec3A;
 
 use super::vertex_areas;
 use crate::numeric::{SolveBuffer, SparseCholesky, SymmetricMatrix};
-use crate::pipeline::{ScanSurface, Sphere};
+use crate::pipeline::{GroupwiseSettings, ScanSurface, Sphere};
 
 /// Weight that holds the vertices around a film, and one that no film feels.
 const FIXED: f64 = 1e5;
 const FREE: f64 = 1e-4;
+
+/// Diffusion of films per vertex of the sphere, so that it reaches as far on coarse ones as on fine ones.
+const SMOOTHING: f64 = 16.0 / 2562.0;
 
 /// Steps after which a fall is taken to miss the scan.
 const MOST_STEPS: usize = 20;
@@ -37,25 +40,43 @@ pub fn fall(scan: &ScanSurface, p: Vec3A, inwards: Vec3A, slack: f32) -> Option<
     None
 }
 
-/// Draws the mean flat where some member's area is more than `ratio` times its own: there the members do not agree on
-/// a shape, and a tangle of the mean would hold a film that is to fall.
+/// Draws the mean flat where some member's area is more than `film_stretch` times its own: there the members do not agree
+/// on a shape, and a tangle of the mean would hold a film that is to fall.
 ///
-/// Solves L p = 0 on those vertices and their neighbours, the others held.
-pub fn flatten_films(sphere: &Sphere, mean: &mut [Vec3A], members: &[Vec<Vec3A>], ratio: f32) {
+/// Solves L p = 0 on those vertices and what is around them, the others held. The film's edge is the line where its diffused
+/// indicator is `film_share`: a ragged one would leave shreds of lips hanging, which stay shreds on every open mouth.
+pub fn flatten_films(
+    sphere: &Sphere,
+    mean: &mut [Vec3A],
+    members: &[Vec<Vec3A>],
+    settings: &GroupwiseSettings,
+) {
+    let film = film(sphere, mean, members, settings);
+    if film.contains(&true) && film.contains(&false) {
+        flatten(sphere, mean, &film);
+    }
+}
+
+/// The vertices of films `[N]`.
+fn film(sphere: &Sphere, mean: &[Vec3A], members: &[Vec<Vec3A>], settings: &GroupwiseSettings) -> Vec<bool> {
     let own = vertex_areas(&sphere.connectivity.topology, mean);
     let mut stretched = vec![false; mean.len()];
     for member in members {
         let areas = vertex_areas(&sphere.connectivity.topology, member);
         for ((stretched, area), own) in stretched.iter_mut().zip(areas).zip(&own) {
-            *stretched |= area > ratio * own;
+            *stretched |= area > settings.film_stretch * own;
         }
     }
     let around =
         |i: usize| sphere.connectivity.topology.neighbours.row(i).iter().any(|&j| stretched[j as usize]);
-    let film: Vec<bool> = (0..mean.len()).map(|i| stretched[i] || around(i)).collect();
-    if film.contains(&true) && film.contains(&false) {
-        flatten(sphere, mean, &film);
+    let film = (0..mean.len()).map(|i| stretched[i] || around(i));
+    if settings.film_share <= 0.0 || !stretched.contains(&true) {
+        return film.collect();
     }
+    let mut share: Vec<f32> = film.map(|film| f32::from(u8::from(film))).collect();
+    let lambda = SMOOTHING * mean.len() as f64;
+    sphere.connectivity.diffusion(lambda).solve_scalar(&mut share, &mut SolveBuffer::default());
+    share.into_iter().map(|share| share > settings.film_share).collect()
 }
 
 fn flatten(sphere: &Sphere, p: &mut [Vec3A], film: &[bool]) {
@@ -82,6 +103,7 @@ mod tests {
 
     use super::*;
     use crate::mesh::{Icosphere, TriangleMesh};
+    use crate::pipeline::{Preset, Settings};
 
     /// A sphere pushed in from above: a bowl of depth 1.2.
     fn bowl() -> ScanSurface {
@@ -110,6 +132,34 @@ mod tests {
         assert_eq!(fall(&scan, inside, -Vec3A::Z, 0.01), None, "the inside is no air");
     }
 
+    fn settings(film_share: f32) -> GroupwiseSettings {
+        let settings = Settings::preset(Preset::Default, 2562).unwrap().groupwise;
+        GroupwiseSettings { film_stretch: 4.0, film_share, ..settings }
+    }
+
+    #[test]
+    fn a_ragged_edge_of_a_film_is_drawn_straight() {
+        let sphere = Sphere::of_level(4);
+        let teeth = |p: &Vec3A| 0.75 + 0.15 * (5.0 * p.y.atan2(p.x)).sin().signum();
+        let member: Vec<Vec3A> =
+            sphere.rest.iter().map(|p| if p.z > teeth(p) { *p * 4.0 } else { *p }).collect();
+        let [ragged, straight] = [0.0, 0.3]
+            .map(|share| film(&sphere, &sphere.rest, std::slice::from_ref(&member), &settings(share)));
+        // How much the height of its edge varies.
+        let spread = |film: &[bool]| {
+            let edges = sphere.connectivity.topology.edges.iter().map(|edge| edge.map(|i| i as usize));
+            let crossing = edges.filter(|[a, b]| film[*a] != film[*b]);
+            let heights: Vec<f32> =
+                crossing.map(|[a, b]| (sphere.rest[a].z + sphere.rest[b].z) / 2.0).collect();
+            let mean = heights.iter().sum::<f32>() / heights.len() as f32;
+            (heights.iter().map(|z| (z - mean) * (z - mean)).sum::<f32>() / heights.len() as f32).sqrt()
+        };
+        let (before, after) = (spread(&ragged), spread(&straight));
+        assert!(before > 0.05 && after < 0.4 * before, "{after} of {before}");
+        assert!((0..straight.len()).all(|i| straight[i] || sphere.rest[i].z < 0.9));
+        assert!((0..straight.len()).all(|i| !straight[i] || sphere.rest[i].z > 0.3));
+    }
+
     #[test]
     fn a_crumpled_film_becomes_flat_and_its_surroundings_stay() {
         let sphere = Sphere::of_level(3);
@@ -123,7 +173,7 @@ mod tests {
             }
         }
         let before = mean.clone();
-        flatten_films(&sphere, &mut mean, &[member], 4.0);
+        flatten_films(&sphere, &mut mean, &[member], &settings(0.3));
         let cap: Vec<usize> = (0..mean.len()).filter(|&i| sphere.rest[i].z > 0.9).collect();
         assert!(cap.len() > 10);
         for &i in &cap {

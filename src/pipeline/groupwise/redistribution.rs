@@ -155,6 +155,7 @@ mod tests {
         }
         let settings =
             crate::pipeline::Settings::preset(crate::pipeline::Preset::Default, 2562).unwrap().groupwise;
+        let settings = GroupwiseSettings { most_need: 10.0, ..settings };
         let positions = member.iter().map(|p| p.as_dvec3()).collect();
         let mesh = TriangleMesh::new(positions, Icosphere::new(4).triangles).unwrap();
         let scan = ScanSurface::new(&mesh, 20_000);

@@ -41,7 +41,7 @@ impl SharedMesh {
         self.mean = carried(&self.sphere, &self.mean, moved.iter().map(at));
         let shapes: Vec<Vec<Vec3A>> =
             shapes.iter().map(|shape| carried(&self.sphere, shape, moved.iter().map(at))).collect();
-        flatten_films(&self.sphere, &mut self.mean, &shapes, settings.film_stretch);
+        flatten_films(&self.sphere, &mut self.mean, &shapes, settings);
         moved
     }
 }
