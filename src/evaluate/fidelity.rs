@@ -103,8 +103,10 @@ impl Fidelity {
         let spacing = Spacing::of(mesh);
         let meeting = self_intersections(mesh.positions(), mesh.triangles());
         let space = UnitSpace::of(&scan);
-        let is_whole = matches!(scan, Cow::Borrowed(_));
-        let [scan, whole, mesh] = [&*scan, whole, mesh].map(|mesh| Surface::new(mesh, &space));
+        let masked = matches!(scan, Cow::Owned(_)).then(|| Surface::new(whole, &space));
+        let [scan, mesh] = [&*scan, mesh].map(|mesh| Surface::new(mesh, &space));
+        let is_whole = masked.is_none();
+        let whole = masked.as_ref().unwrap_or(&scan);
         let border = Border::of(whole.positions.len(), whole.triangles);
         let counts =
             |hit: &Hit| (is_whole || is_data(&whole.triangles[hit.triangle as usize])) && !border.holds(hit);
@@ -112,7 +114,7 @@ impl Fidelity {
         let reach = if is_patch(&mesh) { PATCH_REACH * PATCH_REACH } else { f32::INFINITY };
         let is_over = |hit: &Hit| !end.holds(hit) && hit.distance_squared <= reach;
         let onto_mesh = Pairs::between(&scan, &mesh, SAMPLES, SEEDS[0], is_over);
-        let onto_scan = Pairs::between(&mesh, &whole, SAMPLES, SEEDS[1], counts);
+        let onto_scan = Pairs::between(&mesh, whole, SAMPLES, SEEDS[1], counts);
         let normal = (mean(&onto_mesh.turns) + mean(&onto_scan.turns)) / 2.0;
         let residual = |squared: f32| f64::from(squared).sqrt() * space.radius;
         let tolerance = (TOLERANCE * quality.radius).max(NOISE_TOLERANCE * quality.noise);
@@ -132,7 +134,7 @@ impl Fidelity {
             scan_to_mesh: Distances::of_squares(&onto_mesh.distances, space.radius),
             mesh_to_scan: Distances::of_squares(&onto_scan.distances, space.radius),
             normal: normal.is_finite().then_some(normal),
-            flipped: flipped_share(&mesh, &whole, counts),
+            flipped: flipped_share(&mesh, whole, counts),
             sliver: sliver_share(&mesh),
             self_intersecting: meeting.triangles.len() as f64 / mesh.triangles.len() as f64,
             self_intersections: meeting.pairs,
