@@ -98,7 +98,7 @@ impl Fidelity {
     /// the scan. If none are, all are.
     pub fn of_part(scan: &TriangleMesh, is_data: impl Fn(&[u32; 3]) -> bool, mesh: &TriangleMesh) -> Self {
         let whole = scan;
-        let scan = part(whole, &is_data);
+        let scan = whole.only(whole.triangles().iter().copied().filter(&is_data).collect());
         let quality = ScanQuality::of(&scan);
         let spacing = Spacing::of(mesh);
         let meeting = self_intersections(mesh.positions(), mesh.triangles());
@@ -146,15 +146,6 @@ impl Fidelity {
                 .collect(),
         }
     }
-}
-
-/// The triangles of a scan that are data; all where these are no mesh.
-fn part(scan: &TriangleMesh, is_data: impl Fn(&[u32; 3]) -> bool) -> Cow<'_, TriangleMesh> {
-    let data: Vec<[u32; 3]> = scan.triangles().iter().copied().filter(|corners| is_data(corners)).collect();
-    if data.len() == scan.triangles().len() {
-        return Cow::Borrowed(scan);
-    }
-    TriangleMesh::new(scan.positions().to_vec(), data).map_or(Cow::Borrowed(scan), Cow::Owned)
 }
 
 /// Whether a surface's opening is more than a fifth of it, as its area vectors say, which those of a closed one balance:

@@ -1,3 +1,5 @@
+use std::borrow::Cow;
+
 use glam::DVec3;
 
 /// Index of a vertex in its mesh.
@@ -95,6 +97,14 @@ impl TriangleMesh {
     /// Vertex indices of each triangle `[F, 3]`.
     pub fn triangles(&self) -> &[[u32; 3]] {
         &self.triangles
+    }
+
+    /// Some of its triangles `[F, 3]` on all its vertices; all of it if these are no mesh.
+    pub fn only(&self, triangles: Vec<[u32; 3]>) -> Cow<'_, Self> {
+        if triangles.len() == self.triangles.len() {
+            return Cow::Borrowed(self);
+        }
+        Self::new(self.positions.clone(), triangles).map_or(Cow::Borrowed(self), Cow::Owned)
     }
 
     /// The same triangles on other positions `[N, 3]`.

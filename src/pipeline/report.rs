@@ -1,4 +1,3 @@
-use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 use serde::Serialize;
@@ -69,7 +68,7 @@ impl ScanReport {
             Some((name.clone(), position(result, at).distance(target)))
         };
         let landmarks: BTreeMap<String, f64> = template.landmarks.iter().filter_map(residual).collect();
-        let matched = only(result, matched_triangles(template));
+        let matched = result.only(matched_triangles(template));
         let mut report = Self {
             name: subject.name.clone(),
             verdict: Verdict::Pass,
@@ -98,15 +97,6 @@ impl Report {
     pub fn count(&self, verdict: Verdict) -> usize {
         self.scans.iter().filter(|scan| scan.verdict == verdict).count()
     }
-}
-
-/// A mesh of some of its triangles and all its vertices; all of it if these are no mesh.
-fn only(mesh: &TriangleMesh, triangles: Vec<[u32; 3]>) -> Cow<'_, TriangleMesh> {
-    if triangles.len() == mesh.triangles().len() {
-        return Cow::Borrowed(mesh);
-    }
-    let part = TriangleMesh::new(mesh.positions().to_vec(), triangles);
-    part.map_or(Cow::Borrowed(mesh), Cow::Owned)
 }
 
 /// Whether the scan's mask leaves a triangle's corners in.
