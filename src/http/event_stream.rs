@@ -13,7 +13,7 @@ use super::app::App;
 use super::problem::{Kind, Problem};
 use super::wire::registration::EventView;
 use crate::job::event::Event;
-use crate::job::{JobId, OfKind};
+use crate::job::{JobId, OfKind, Told};
 
 /// How often something is sent when nothing happens, so that nobody on the way hangs up.
 const KEEP_ALIVE: Duration = Duration::from_secs(15);
@@ -47,7 +47,7 @@ pub async fn stream<K: OfKind>(app: &App, id: &JobId<K>, headers: &HeaderMap) ->
     let stream = futures_util::stream::unfold(feed, |mut feed| async move {
         // A client that misses events for a failure comes back with the last that it has.
         let event = feed.next().await.ok().flatten()?;
-        Some((Ok::<_, Infallible>(server_event(event)), feed))
+        Some((Ok::<_, Infallible>(server_event(&event)), feed))
     });
     let stream = stream.take_until(ending.cancelled_owned());
     Ok(Sse::new(stream).keep_alive(KeepAlive::new().interval(KEEP_ALIVE)).into_response())
@@ -58,8 +58,8 @@ fn event_number(text: &str) -> Option<u64> {
     text.trim().parse().ok().filter(|&number| i64::try_from(number).is_ok())
 }
 
-fn server_event(event: Event) -> ServerEvent {
+fn server_event(event: &Told<Event>) -> ServerEvent {
     let (id, name) = (event.sequence.to_string(), event.kind.name());
-    let data = serde_json::to_string(&EventView::from(event)).unwrap_or_default();
-    ServerEvent::default().id(id).event(name).data(data)
+    let data = event.words(|event| serde_json::to_vec(&EventView::from(event.clone())).unwrap_or_default());
+    ServerEvent::default().id(id).event(name).data(String::from_utf8_lossy(&data))
 }

@@ -4,7 +4,7 @@ use std::fmt::Display;
 use std::time::Duration;
 
 use axum::Json;
-use axum::http::header::LOCATION;
+use axum::http::header::{CONTENT_TYPE, LOCATION};
 use axum::http::{HeaderMap, HeaderValue, Method, StatusCode};
 use axum::response::{IntoResponse, Response};
 use serde::Serialize;
@@ -65,6 +65,19 @@ pub async fn answer<K: OfKind, V: From<Job<K>> + Serialize>(
         response.headers_mut().insert("preference-applied", HeaderValue::from_static("wait"));
     }
     Ok(response)
+}
+
+/// Tells how a job stands.
+///
+/// # Errors
+/// A [`Problem`].
+pub async fn standing<K: OfKind, V: From<Job<K>> + Serialize>(
+    app: &App,
+    id: &JobId<K>,
+) -> Result<Response, Problem> {
+    let job = app.jobs.snapshot(id).await?;
+    let words = job.words(|job| serde_json::to_vec(&V::from(job.clone())).unwrap_or_default());
+    Ok(([(CONTENT_TYPE, "application/json")], words).into_response())
 }
 
 /// Answers with a file that a job left, which never changes.

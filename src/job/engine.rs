@@ -22,6 +22,7 @@ use super::settings::JobSettings;
 use super::snapshots::Snapshots;
 use super::state::Problem;
 use super::store_error::StoreError;
+use super::told::Told;
 use super::work::{Decided, Fault, Produced};
 use super::{queue, sweep};
 use crate::render::Adapter;
@@ -46,7 +47,7 @@ pub(super) struct Engine {
     compute: Compute,
     /// The steps that run, by their ids.
     running: Mutex<HashMap<i64, Arc<Control>>>,
-    feeds: Mutex<HashMap<i64, broadcast::Sender<Event>>>,
+    feeds: Mutex<HashMap<i64, broadcast::Sender<Arc<Told<Event>>>>>,
     /// Told when steps become ready.
     pub wake: Notify,
     /// What draws, once it was opened.
@@ -345,7 +346,7 @@ impl Engine {
             let last = event.kind.is_last();
             if let Some(feed) = feeds.get(&job) {
                 // Nobody may listen any more.
-                let _ = feed.send(event);
+                let _ = feed.send(Arc::new(Told::new(event)));
             }
             if last {
                 feeds.remove(&job);
@@ -372,7 +373,7 @@ impl Engine {
     }
 
     /// The events of a job from now on.
-    pub fn subscribe(&self, job: i64) -> broadcast::Receiver<Event> {
+    pub fn subscribe(&self, job: i64) -> broadcast::Receiver<Arc<Told<Event>>> {
         const BUFFERED: usize = 64;
         let mut feeds = lock(&self.feeds);
         feeds.entry(job).or_insert_with(|| broadcast::channel(BUFFERED).0).subscribe()

@@ -8,6 +8,7 @@ use super::engine::Engine;
 use super::error::JobError;
 use super::event::Event;
 use super::record::events;
+use super::told::Told;
 
 /// Events that are read at once.
 const PAGE: i64 = 256;
@@ -18,8 +19,8 @@ pub struct EventFeed {
     job: i64,
     /// The number of the last that was given.
     last: u64,
-    waiting: VecDeque<Event>,
-    live: broadcast::Receiver<Event>,
+    waiting: VecDeque<Arc<Told<Event>>>,
+    live: broadcast::Receiver<Arc<Told<Event>>>,
     /// Whether there may be some in the database that have not been read.
     behind: bool,
     ended: bool,
@@ -36,7 +37,7 @@ impl EventFeed {
     ///
     /// # Errors
     /// [`JobError::Store`].
-    pub async fn next(&mut self) -> Result<Option<Event>, JobError> {
+    pub async fn next(&mut self) -> Result<Option<Arc<Told<Event>>>, JobError> {
         loop {
             if let Some(event) = self.waiting.pop_front() {
                 if event.sequence > self.last {
@@ -72,7 +73,7 @@ impl EventFeed {
         if page.is_empty() && query.fetch_optional(reader).await?.is_none() {
             self.ended = true;
         }
-        self.waiting.extend(page);
+        self.waiting.extend(page.into_iter().map(|event| Arc::new(Told::new(event))));
         Ok(())
     }
 }

@@ -24,6 +24,7 @@ use super::settings::JobSettings;
 use super::state::{Job, Status};
 use super::store_error::StoreError;
 use super::template::Templates;
+use super::told::Told;
 use super::{queue, supervisor, sweep};
 
 /// How long steps may take to stop when the program ends; what has not stopped is begun anew at the next start.
@@ -109,17 +110,26 @@ impl Jobs {
     /// # Errors
     /// [`JobError::NotFound`].
     pub async fn get<K: OfKind>(&self, id: &JobId<K>) -> Result<Job<K>, JobError> {
+        let told = self.snapshot(id).await?;
+        Ok(Arc::try_unwrap(told).map_or_else(|shared| Job::clone(&shared), Told::into_inner))
+    }
+
+    /// How it stood a moment ago, together with all who ask now.
+    ///
+    /// # Errors
+    /// [`JobError::NotFound`].
+    pub async fn snapshot<K: OfKind>(&self, id: &JobId<K>) -> Result<Arc<Told<Job<K>>>, JobError> {
         let snapshots = &self.engine.snapshots;
         let generation = match snapshots.get(id.as_str()) {
-            Ok(job) => return Ok(Arc::unwrap_or_clone(job)),
+            Ok(job) => return Ok(job),
             Err(generation) => generation,
         };
         // One transaction, so that what is said of its scans goes with what is said of it.
         let mut tx = self.engine.database.reader().begin().await?;
         let found = record::whole(&mut tx, id, &self.engine.fractions()).await?;
-        let job = Arc::new(found.ok_or_else(|| no_such(id))?);
+        let job = Arc::new(Told::new(found.ok_or_else(|| no_such(id))?));
         snapshots.keep(generation, id.as_str(), &job);
-        Ok(Arc::unwrap_or_clone(job))
+        Ok(job)
     }
 
     /// Some of them, the latest first, without their children.

@@ -53,6 +53,7 @@ mod supervisor;
 mod sweep;
 #[cfg(test)]
 mod tests;
+mod told;
 mod work;
 
 pub use error::JobError;
@@ -60,3 +61,4 @@ pub use feed::EventFeed;
 pub use job_id::{BadJobId, JobId, JobKind, OfKind};
 pub use jobs::Jobs;
 pub use settings::JobSettings;
+pub use told::Told;

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use super::engine::lock;
 
 /// How long what was read is told again, where nothing was written meanwhile: steps that run get on without that.
-const FRESH: Duration = Duration::from_millis(100);
+const FRESH: Duration = Duration::from_millis(250);
 
 /// How jobs stand, for a moment, so that a thousand clients who ask at once read the database once.
 #[derive(Default)]

@@ -28,7 +28,7 @@ const SCANS: usize = 3;
 /// Triangles of a scan.
 const TRIANGLES: usize = 60_000;
 /// How often that is done, without clients and with them in turn.
-const ROUNDS: usize = 3;
+const ROUNDS: usize = 5;
 /// How long it goes on at most.
 const LONGEST: Duration = Duration::from_secs(300);
 

@@ -17,7 +17,7 @@ use crate::http::app::App;
 use crate::http::auth::Client;
 use crate::http::capture_upload::receive_capture;
 use crate::http::extract::{Id, QueryOf};
-use crate::http::job_answer::{answer, dedupe_key};
+use crate::http::job_answer::{answer, dedupe_key, standing};
 use crate::http::page::{Page, limit, usual};
 use crate::http::problem::{Kind, Problem};
 use crate::http::webhook::check_address;
@@ -182,11 +182,8 @@ async fn list(
     params(("id" = String, Path, description = "The inverse rendering's id.", pattern = "^[0-9a-f]{32}$")),
     responses((status = 200, description = "How it stands.", body = InverseRenderingView)),
 )]
-async fn get(
-    State(app): State<App>,
-    Id(id): Id<InverseRenderingId>,
-) -> Result<Json<InverseRenderingView>, Problem> {
-    Ok(Json(app.jobs.get(&id).await?.into()))
+async fn get(State(app): State<App>, Id(id): Id<InverseRenderingId>) -> Result<Response, Problem> {
+    standing::<_, InverseRenderingView>(&app, &id).await
 }
 
 /// Stops an inverse rendering

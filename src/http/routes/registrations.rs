@@ -12,7 +12,7 @@ use utoipa_axum::routes;
 use crate::http::app::App;
 use crate::http::auth::Client;
 use crate::http::extract::{Id, JsonBody, QueryOf};
-use crate::http::job_answer::{answer, dedupe_key};
+use crate::http::job_answer::{answer, dedupe_key, standing};
 use crate::http::page::{Page, limit, usual};
 use crate::http::problem::{Kind, Problem};
 use crate::http::upload::check_room;
@@ -108,8 +108,8 @@ async fn list(
     params(("id" = String, Path, description = "The registration's id.", pattern = "^[0-9a-f]{32}$")),
     responses((status = 200, description = "How it stands.", body = RegistrationView)),
 )]
-async fn get(State(app): State<App>, Id(id): Id<RegistrationId>) -> Result<Json<RegistrationView>, Problem> {
-    Ok(Json(app.jobs.get(&id).await?.into()))
+async fn get(State(app): State<App>, Id(id): Id<RegistrationId>) -> Result<Response, Problem> {
+    standing::<_, RegistrationView>(&app, &id).await
 }
 
 /// Stops a registration
