@@ -16,6 +16,10 @@ use hyper_util::service::TowerToHyperService;
 use tokio::net::{TcpListener, TcpStream};
 use tokio_util::sync::CancellationToken;
 
+/// Bytes of a request that are held at once, its head or a piece of its body: of every upload several pieces wait to be
+/// written.
+const BUFFERED: usize = 64 << 10;
+
 /// Answers by `routes` until `stopping`, then lets requests under way end. A client that has not sent a request's head
 /// within `patience`, the first or a later one, is hung up on: it would hold its connection for nothing.
 pub async fn serve(
@@ -25,7 +29,7 @@ pub async fn serve(
     stopping: CancellationToken,
 ) {
     let mut server = http1::Builder::new();
-    server.timer(TokioTimer::new()).header_read_timeout(patience);
+    server.timer(TokioTimer::new()).header_read_timeout(patience).max_buf_size(BUFFERED);
     let open = GracefulShutdown::new();
     loop {
         // What keeps it from accepting, as too many open files, is waited out within.

@@ -35,6 +35,12 @@ impl<T> Deref for Told<T> {
     }
 }
 
+impl<T: PartialEq> PartialEq for Told<T> {
+    fn eq(&self, other: &Self) -> bool {
+        self.what == other.what
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

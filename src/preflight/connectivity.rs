@@ -53,10 +53,11 @@ impl Connectivity {
     /// Of a mesh; sides of triangles that name a vertex twice are left out.
     pub fn of(mesh: &TriangleMesh) -> Self {
         // As many as have their corners listed at a time: the list of all would be as large as the mesh.
-        const LISTED: usize = 1 << 16;
+        const LISTED: usize = 1 << 15;
         const VERTICES: usize = 4096;
         let (triangles, vertices) = (mesh.triangles(), mesh.positions().len());
         let (mut found, mut rim) = (Self::default(), Vec::new());
+        let in_largest = found.add_components(mesh);
         for first in (0..vertices).step_by(LISTED) {
             let listed = first..(first + LISTED).min(vertices);
             let corners = Corners::of(triangles, listed.clone());
@@ -67,9 +68,7 @@ impl Connectivity {
                 rim.extend(part.rim);
             }
         }
-        let part_of = components(vertices, triangles);
-        let largest = found.add_components(mesh, &part_of);
-        found.add_loops(mesh, &rim, |v| part_of[v as usize] == largest);
+        found.add_loops(mesh, &rim, &in_largest);
         found
     }
 
@@ -81,8 +80,9 @@ impl Connectivity {
         self.duplicate_triangles += fans.duplicate_triangles;
     }
 
-    /// Collects the parts, and the largest part's volume without its rims' fans; returns the largest part's first vertex.
-    fn add_components(&mut self, mesh: &TriangleMesh, part_of: &[u32]) -> u32 {
+    /// Collects the parts, and the largest part's volume without its rims' fans; returns which vertices that part has.
+    fn add_components(&mut self, mesh: &TriangleMesh) -> Vec<bool> {
+        let part_of = components(mesh.positions().len(), mesh.triangles());
         // Parts are called by their first vertices, which are few.
         let firsts: Vec<u32> = (0..part_of.len() as u32).filter(|&v| part_of[v as usize] == v).collect();
         let place = |v: u32| firsts.partition_point(|&first| first < part_of[v as usize]);
@@ -102,15 +102,15 @@ impl Connectivity {
         let area = |at: usize| parts[at].area;
         let largest = (0..parts.len()).filter(there).reduce(|a, b| if area(b) > area(a) { b } else { a });
         // A mesh has triangles.
-        let Some(largest) = largest else { return 0 };
+        let Some(largest) = largest else { return vec![false; part_of.len()] };
         self.largest_volume = volumes[largest];
         self.components = parts.into_iter().filter(|part| part.triangles > 0).collect();
         self.components.sort_by(|a, b| b.area.total_cmp(&a.area));
-        firsts[largest]
+        part_of.iter().map(|&part| part == firsts[largest]).collect()
     }
 
     /// Chains rim edges to loops, and closes those of the largest part for its volume.
-    fn add_loops(&mut self, mesh: &TriangleMesh, rim: &[[u32; 2]], in_largest: impl Fn(u32) -> bool) {
+    fn add_loops(&mut self, mesh: &TriangleMesh, rim: &[[u32; 2]], in_largest: &[bool]) {
         let place = |v: u32| mesh.positions()[v as usize];
         let origin = mesh.centroid();
         for edges in chains(rim) {
@@ -118,7 +118,7 @@ impl Connectivity {
             let centre = edges.iter().map(|&[from, _]| place(from)).sum::<DVec3>() / count;
             let length = edges.iter().map(|&[from, to]| place(from).distance(place(to))).sum();
             self.loops.push(BoundaryLoop { vertices: edges.len(), length, centre: centre.to_array() });
-            if in_largest(edges[0][0]) {
+            if in_largest[edges[0][0] as usize] {
                 let fan = |&[from, to]: &[u32; 2]| {
                     (place(to) - origin).dot((place(from) - origin).cross(centre - origin))
                 };
