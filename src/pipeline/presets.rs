@@ -53,7 +53,7 @@ impl Settings {
     pub fn for_fit(preset: Preset, vertices: usize) -> Result<Self, SettingError> {
         let settings = Self::preset(preset, vertices)?;
         let fit = match preset {
-            Preset::Default => coarse_to_fine(Icosphere::level_of(vertices).unwrap_or(COARSEST), 200),
+            Preset::Default => coarse_to_fine(Icosphere::level_of(vertices).unwrap_or(COARSEST), 140),
             Preset::Paper => settings.fit,
         };
         Ok(Self { fit, ..settings })
@@ -95,26 +95,29 @@ fn paper(level: u32) -> FitSettings {
     }
 }
 
+/// Up to the finest level, which takes so many iterations; each coarser one takes 30 less.
 fn coarse_to_fine(finest: u32, iterations: usize) -> FitSettings {
-    FitSettings { start_radius: 0.9, levels: (COARSEST..=finest).map(|k| level(k, iterations)).collect() }
+    let of = |k| level(k, iterations - 30 * (finest - k) as usize);
+    FitSettings { start_radius: 0.9, levels: (COARSEST..=finest).map(of).collect() }
 }
 
+/// On ten scans long steps under little diffusion beat twice the iterations of what the paper's lambda suggests: at 10242
+/// vertices the Chamfer distance was half as large, in half the time.
 fn level(level: u32, iterations: usize) -> LevelSettings {
-    let depth = level - COARSEST;
+    let depth = (level - COARSEST) as usize;
     let shrink = 0.6f32.powi(depth as i32);
-    let lambda = [4.0, 6.0, 10.0, 16.0][depth as usize];
     LevelSettings {
         level,
         iterations,
-        lambda,
-        rate: 0.4 * 0.5f32.powi(depth as i32),
+        lambda: [4.0, 4.0, 5.0, 6.0][depth],
+        rate: [0.4, 0.3, 0.2, 0.1][depth],
         rate_end: 0.05,
-        refresh: if depth < 2 { 2 } else { 4 },
+        refresh: [2, 3, 4, 4][depth],
         // With one exact vertex in eight the Chamfer distance of six scans was half as large again, with one in two
         // a seventh; samples that walk on fine levels left it within its scatter.
         vertex_fresh: 1,
         sample_fresh: if depth < 2 { 1 } else { 4 },
-        samples: (4 * (10 * 4usize.pow(level) + 2)).min(30_000),
+        samples: (2 * (10 * 4usize.pow(level) + 2)).min(20_000),
         normal_weight: [0.06, 0.3],
         normal_search: [0.15 * shrink, 0.045 * shrink],
         least_cosine: 0.0,
