@@ -20,29 +20,40 @@ fn holds(name: &str, found: f64, golden: f64) {
     assert!(found <= SLACK * golden, "{name}: {found:.2e}, once {golden:.2e}");
 }
 
-/// Figures of a fit whose template has 2562 vertices.
-fn fitted(preset: Preset) -> SurfaceFigures {
-    let scan = &heads(1)[0].mesh;
+/// Figures of fits to so many heads whose template has 2562 vertices.
+fn fitted(preset: Preset, count: usize) -> Vec<SurfaceFigures> {
     let settings = Settings::for_fit(preset, 2562).unwrap().fit;
-    let positions = fit_scan("head", scan, &settings, &()).unwrap();
-    let mesh = Sphere::of_level(4).connectivity.topology.mesh(positions).unwrap();
-    surface_figures(scan, &mesh, true)
+    let figures = |head: SculptedHead| {
+        let positions = fit_scan("head", &head.mesh, &settings, &()).unwrap();
+        let mesh = Sphere::of_level(4).connectivity.topology.mesh(positions).unwrap();
+        surface_figures(&head.mesh, &mesh, true)
+    };
+    heads(count).into_iter().map(figures).collect()
+}
+
+/// What heads have in common: of one alone it hangs by a hair whether a fold is entered.
+fn geometric_mean(figures: &[SurfaceFigures], figure: impl Fn(&SurfaceFigures) -> f64) -> f64 {
+    (figures.iter().map(|own| figure(own).ln()).sum::<f64>() / figures.len() as f64).exp()
+}
+
+fn mean(figures: &[SurfaceFigures], figure: impl Fn(&SurfaceFigures) -> f64) -> f64 {
+    figures.iter().map(figure).sum::<f64>() / figures.len() as f64
 }
 
 #[test]
 fn fit_by_default() {
-    let figures = fitted(Preset::Default);
-    holds("chamfer", figures.chamfer, 5.6e-6);
-    holds("normal", figures.normal, 0.039);
-    holds("flipped", figures.flipped, 0.002);
-    holds("sliver", figures.sliver, 0.001);
+    let figures = fitted(Preset::Default, 4);
+    holds("chamfer", geometric_mean(&figures, |own| own.chamfer), 6.7e-6);
+    holds("normal", geometric_mean(&figures, |own| own.normal), 0.0361);
+    holds("flipped", mean(&figures, |own| own.flipped), 0.002);
+    holds("sliver", mean(&figures, |own| own.sliver), 0.001);
 }
 
 #[test]
 fn fit_by_the_paper() {
-    let figures = fitted(Preset::Paper);
-    holds("chamfer", figures.chamfer, 1.43e-5);
-    holds("normal", figures.normal, 0.053);
+    let figures = fitted(Preset::Paper, 1);
+    holds("chamfer", geometric_mean(&figures, |own| own.chamfer), 1.43e-5);
+    holds("normal", geometric_mean(&figures, |own| own.normal), 0.053);
 }
 
 #[test]
