@@ -43,7 +43,7 @@ fn mean(figures: &[SurfaceFigures], figure: impl Fn(&SurfaceFigures) -> f64) -> 
 #[test]
 fn fit_by_default() {
     let figures = fitted(Preset::Default, 4);
-    holds("chamfer", geometric_mean(&figures, |own| own.chamfer), 6.4e-6);
+    holds("chamfer", geometric_mean(&figures, |own| own.chamfer), 5.6e-6);
     holds("normal", geometric_mean(&figures, |own| own.normal), 0.0356);
     holds("flipped", mean(&figures, |own| own.flipped), 0.002);
     holds("sliver", mean(&figures, |own| own.sliver), 0.001);
