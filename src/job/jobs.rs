@@ -110,8 +110,7 @@ impl Jobs {
     /// # Errors
     /// [`JobError::NotFound`].
     pub async fn get<K: OfKind>(&self, id: &JobId<K>) -> Result<Job<K>, JobError> {
-        let told = self.snapshot(id).await?;
-        Ok(Arc::try_unwrap(told).map_or_else(|shared| Job::clone(&shared), Told::into_inner))
+        Ok(Job::clone(&*self.snapshot(id).await?))
     }
 
     /// How it stood a moment ago, together with all who ask now.

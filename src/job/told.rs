@@ -20,11 +20,6 @@ impl<T> Told<T> {
     pub fn words(&self, find: impl FnOnce(&T) -> Vec<u8>) -> Bytes {
         self.words.get_or_init(|| find(&self.what).into()).clone()
     }
-
-    /// What is told.
-    pub fn into_inner(self) -> T {
-        self.what
-    }
 }
 
 impl<T> Deref for Told<T> {
