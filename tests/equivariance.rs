@@ -26,7 +26,7 @@ fn moved(mesh: &TriangleMesh, motion: impl Fn(DVec3) -> DVec3) -> TriangleMesh {
 }
 
 fn fit(mesh: &TriangleMesh, settings: &FitSettings) -> Vec<DVec3> {
-    fit_scan("head", mesh, settings, &()).unwrap()
+    fit_scan("head", mesh, settings, &()).unwrap().0
 }
 
 /// The largest distance between two results, in units of the scan's radius.

@@ -24,7 +24,7 @@ fn holds(name: &str, found: f64, golden: f64) {
 fn fitted(preset: Preset, count: usize) -> Vec<SurfaceFigures> {
     let settings = Settings::for_fit(preset, 2562).unwrap().fit;
     let figures = |head: SculptedHead| {
-        let positions = fit_scan("head", &head.mesh, &settings, &()).unwrap();
+        let (positions, _) = fit_scan("head", &head.mesh, &settings, &()).unwrap();
         let mesh = Sphere::of_level(4).connectivity.topology.mesh(positions).unwrap();
         surface_figures(&head.mesh, &mesh, true)
     };

@@ -1,4 +1,5 @@
 use std::path::{Path, PathBuf};
+use std::time::Instant;
 
 use anyhow::Context;
 use onemesh::demo::{SculptedHead, Sculptor};
@@ -46,9 +47,9 @@ impl Demo {
         if self.scans_only {
             return Ok(());
         }
-        let results = self.output.join("result");
+        let (results, start) = (self.output.join("result"), Instant::now());
         let outcome = register_collection(&collection, &results, None, Outputs::GLB, &settings)?;
-        Summary::of(&results)?.print(&results);
+        Summary::of(&results)?.print(&results, start.elapsed());
         let figures = correspondence(&heads, &outcome)?;
         if let Some(distances) = figures.distances {
             println!(

@@ -3,10 +3,10 @@ use std::time::Instant;
 
 use anyhow::Context;
 use glam::DVec3;
-use onemesh::evaluate::{Fidelity, surface_figures};
+use onemesh::evaluate::surface_figures;
 use onemesh::formats::{read_mesh, write_whole};
 use onemesh::mesh::{Icosphere, Topology, TriangleMesh, sphere_layout};
-use onemesh::pipeline::{ResultMesh, ScanSurface, confidence, fit_scan};
+use onemesh::pipeline::{ResultMesh, confidence, fit_scan};
 
 use super::formats::Formats;
 use super::parameters::Parameters;
@@ -34,7 +34,7 @@ impl Fit {
         let scan = read_mesh(&self.scan)?;
         let name = self.scan.file_stem().map_or("scan".into(), |stem| stem.to_string_lossy());
         let start = Instant::now();
-        let positions = fit_scan(&name, &scan, &settings.fit, &ProgressBars::new())?;
+        let (positions, surface) = fit_scan(&name, &scan, &settings.fit, &ProgressBars::new())?;
         eprintln!("fitted in {:.2} s", start.elapsed().as_secs_f64());
         let level = settings.fit.levels.last().map_or(0, |level| level.level);
         let sphere = Icosphere::new(level);
@@ -43,9 +43,8 @@ impl Fit {
             .with_context(|| format!("the fit to {} failed", self.scan.display()))?;
         // Without landmarks the scan is taken to look along +Z.
         let layout = sphere_layout(&topology, &sphere.positions, DVec3::Z, DVec3::Y);
-        let residuals = Fidelity::of(&scan, &mesh).residuals;
-        let surface = ScanSurface::new(&scan, 1);
         let unit: Vec<_> = mesh.positions().iter().map(|p| surface.to_unit(*p)).collect();
+        let residuals = surface.distances(&unit);
         let known: Vec<f64> = confidence(&surface, &topology, &unit).into_iter().map(f64::from).collect();
         let result = ResultMesh {
             name: &name,

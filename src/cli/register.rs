@@ -40,6 +40,7 @@ pub struct Register {
 impl Register {
     /// Does it.
     pub fn run(self) -> anyhow::Result<()> {
+        let start = Instant::now();
         let GivenTemplate { template, settings, source } = self.template.read()?;
         let settings = match settings {
             Some(settings) => self.parameters.over_frozen(settings)?,
@@ -49,7 +50,7 @@ impl Register {
         let outputs = Outputs { formats: &formats, source: source.as_ref() };
         register_collection(&self.collection, &self.output, template.as_ref(), outputs, &settings)?;
         let summary = Summary::of(&self.output)?;
-        summary.print(&self.output);
+        summary.print(&self.output, start.elapsed());
         summary.conclude(&self.collection, 0)
     }
 }

@@ -9,6 +9,7 @@ use onemesh::pipeline::Settings;
 use rayon::prelude::*;
 use serde::Deserialize;
 use serde_json::Value;
+use std::time::Instant;
 
 use super::client::{
     Asked, AskedScan, Client, Form, KnownScans, MeshUpload, Registration, Scan, ScanUpload, ServerOptions,
@@ -47,6 +48,7 @@ pub struct Submit {
 impl Submit {
     /// Does it.
     pub fn run(self) -> anyhow::Result<()> {
+        let start = Instant::now();
         let parameters = self.asked()?;
         let template = self.template.files()?;
         let (collection, refused) = Collection::open_usable(&self.collection)?;
@@ -61,7 +63,7 @@ impl Submit {
         let registration = register(&client, &asked)?;
         save(&client, &registration, &self.output)?;
         let summary = Summary::of(&self.output)?;
-        summary.print(&self.output);
+        summary.print(&self.output, start.elapsed());
         summary.conclude(&self.collection, left_out)
     }
 

@@ -1,5 +1,5 @@
-use std::collections::BTreeMap;
 use std::path::Path;
+use std::time::Duration;
 
 use anyhow::{Context, ensure};
 use onemesh::pipeline::{FailedScan, Verdict};
@@ -8,7 +8,6 @@ use serde::Deserialize;
 /// What people are told of a report.
 #[derive(Debug, Deserialize)]
 pub struct Summary {
-    seconds: BTreeMap<String, f64>,
     scans: Vec<ScanSummary>,
     /// The scans that were left out.
     pub failed: Vec<FailedScan>,
@@ -55,8 +54,8 @@ impl Summary {
         serde_json::from_slice(&bytes).with_context(|| path.display().to_string())
     }
 
-    /// Says how it went and where the results are.
-    pub fn print(&self, output: &Path) {
+    /// Says how it went, how long it `took`, and where the results are.
+    pub fn print(&self, output: &Path, took: Duration) {
         let widest = self.scans.iter().map(|scan| scan.name.len()).max().unwrap_or(0);
         for scan in &self.scans {
             let distance =
@@ -75,11 +74,10 @@ impl Summary {
                 println!("{:widest$}  - {verdict}: {code}: {found}; {advice}", "");
             }
         }
-        let seconds: f64 = self.seconds.values().sum();
         let [pass, review, fail] =
             [Verdict::Pass, Verdict::Review, Verdict::Fail].map(|verdict| self.count(verdict));
         println!("{pass} pass, {review} to review, {fail} failed");
-        println!("{} scans in {seconds:.1} s: {}", self.scans.len(), output.display());
+        println!("{} scans in {:.1} s: {}", self.scans.len(), took.as_secs_f64(), output.display());
         println!("look at {}", output.join("sheet.png").display());
     }
 

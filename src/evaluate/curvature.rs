@@ -1,4 +1,5 @@
 use glam::DVec3;
+use rayon::prelude::*;
 
 use crate::mesh::Rows;
 
@@ -8,6 +9,8 @@ const TOLERANCE: f64 = 1e-7;
 const MOST_STEPS: usize = 1000;
 /// Twice a triangle's area below which it has no angles and is passed over.
 const DEGENERATE: f64 = 1e-16;
+/// Rows that are worked on by one thread: however many there are, the same are added up together.
+const BLOCK: usize = 1 << 14;
 
 /// Magnitude of the mean curvature at each vertex `[N]`, felt at a scale of about `sqrt(2 step)`: how far the second of
 /// two implicit smoothing steps moves the vertex, divided by `step`.
@@ -22,10 +25,10 @@ pub(super) fn curvature(positions: &[DVec3], triangles: &[[u32; 3]], step: f64) 
 
 /// One implicit smoothing step.
 struct Smoothing {
-    /// `M - step L`, `[N, N]`, with the columns of each row in rising order.
-    matrix: Rows<(u32, f64)>,
-    /// One over its diagonal.
-    inverse: Vec<f64>,
+    /// What `M - step L` has beside its diagonal, `[N, N]`, columns rising; rounded, which the diagonal takes into account.
+    beside: Rows<(u32, f32)>,
+    /// Its diagonal.
+    diagonal: Vec<f64>,
     /// The diagonal of M: a third of the area around each vertex.
     mass: Vec<f64>,
 }
@@ -33,21 +36,16 @@ struct Smoothing {
 impl Smoothing {
     fn new(positions: &[DVec3], triangles: &[[u32; 3]], step: f64) -> Self {
         let count = positions.len();
-        let mut entries = Vec::with_capacity(6 * triangles.len() + count);
+        let place = |v: u32| positions[v as usize];
+        let (weights, areas): (Vec<[f64; 3]>, Vec<f64>) =
+            triangles.par_iter().map(|corners| angles(corners.map(place), step / 2.0)).unzip();
         let mut mass = vec![0.0; count];
-        let mut diagonal = vec![0.0; count];
-        for corners in triangles {
-            let (cotangents, area) = angles(corners.map(|v| positions[v as usize]));
-            for k in 0..3 {
-                let [at, from, to] = [0, 1, 2].map(|turn| corners[(k + turn) % 3] as usize);
-                let weight = step / 2.0 * cotangents[k];
-                entries.push(([from as u32, to as u32], -weight));
-                entries.push(([to as u32, from as u32], -weight));
-                diagonal[from] += weight;
-                diagonal[to] += weight;
-                mass[at] += area / 3.0;
-            }
+        for (corners, area) in triangles.iter().zip(areas) {
+            corners.iter().for_each(|&corner| mass[corner as usize] += area / 3.0);
         }
+        let beside = beside(count, triangles, &weights);
+        let around = |row| -beside.row(row).iter().map(|&(_, value)| f64::from(value)).sum::<f64>();
+        let mut diagonal: Vec<f64> = (0..count).map(around).collect();
         for (d, mass) in diagonal.iter_mut().zip(&mut mass) {
             // A vertex without area would be undetermined, and one in bad slivers may come out negative by rounding.
             if *d + *mass <= 0.0 {
@@ -55,99 +53,133 @@ impl Smoothing {
             }
             *d += *mass;
         }
-        for (at, &d) in diagonal.iter().enumerate() {
-            entries.push(([at as u32; 2], d));
-        }
-        let inverse = diagonal.iter().map(|d| 1.0 / d).collect();
-        Self { matrix: rows(count, entries), inverse, mass }
+        Self { beside, diagonal, mass }
     }
 
     /// Solves for the smoothed positions by conjugate gradients started at `v`; the three coordinates run side by side.
     fn apply(&self, v: &[DVec3]) -> Vec<DVec3> {
-        let wanted: Vec<DVec3> = v.iter().zip(&self.mass).map(|(&v, &m)| m * v).collect();
-        let enough = dot(&wanted, &self.preconditioned(&wanted)) * TOLERANCE * TOLERANCE;
-
         let mut x = v.to_vec();
-        let mut residual: Vec<DVec3> = wanted.iter().zip(self.product(&x)).map(|(&b, y)| b - y).collect();
-        let mut direction = self.preconditioned(&residual);
-        let mut left = dot(&residual, &direction);
+        let mut residual = vec![DVec3::ZERO; v.len()];
+        let mut conditioned = residual.clone();
+        let mut image = residual.clone();
+        let enough = {
+            let wanted = |i: usize| self.mass[i] * v[i];
+            each(&mut residual, |i, r| *r = wanted(i));
+            let whole = self.precondition(&residual, &mut conditioned);
+            self.product(v, &mut image);
+            each(&mut residual, |i, r| *r = wanted(i) - image[i]);
+            whole * TOLERANCE * TOLERANCE
+        };
+        let mut left = self.precondition(&residual, &mut conditioned);
+        let mut direction = conditioned.clone();
         for _ in 0..MOST_STEPS {
             if left.cmple(enough).all() {
                 break;
             }
-            let image = self.product(&direction);
-            let length = ratio(left, dot(&direction, &image));
-            for (k, x) in x.iter_mut().enumerate() {
-                *x += length * direction[k];
-                residual[k] -= length * image[k];
-            }
-            let conditioned = self.preconditioned(&residual);
-            let remaining = dot(&residual, &conditioned);
+            let length = ratio(left, self.product(&direction, &mut image));
+            each(&mut x, |i, x| *x += length * direction[i]);
+            each(&mut residual, |i, r| *r -= length * image[i]);
+            let remaining = self.precondition(&residual, &mut conditioned);
             let keep = ratio(remaining, left);
-            direction.iter_mut().zip(conditioned).for_each(|(d, z)| *d = z + keep * *d);
+            each(&mut direction, |i, d| *d = conditioned[i] + keep * *d);
             left = remaining;
         }
         x
     }
 
-    /// The matrix times `x`.
-    fn product(&self, x: &[DVec3]) -> Vec<DVec3> {
-        let row = |row| self.matrix.row(row).iter().map(|&(at, value)| value * x[at as usize]).sum();
-        (0..self.matrix.len()).map(row).collect()
-    }
-
-    /// One sweep of Gauss-Seidel down the rows and one up, from zero: symmetric, as conjugate gradients ask.
-    fn preconditioned(&self, r: &[DVec3]) -> Vec<DVec3> {
-        let mut z = r.to_vec();
-        for row in 0..z.len() {
-            let mut sum = r[row];
-            for &(at, value) in self.matrix.row(row) {
-                if at as usize >= row {
-                    break;
-                }
-                sum -= value * z[at as usize];
-            }
-            z[row] = sum * self.inverse[row];
-        }
-        for row in (0..z.len()).rev() {
+    /// The matrix times `x`, and that times `x`.
+    fn product(&self, x: &[DVec3], image: &mut [DVec3]) -> DVec3 {
+        blocks(image, |begin, image| {
             let mut sum = DVec3::ZERO;
-            for &(at, value) in self.matrix.row(row).iter().rev() {
-                if at as usize <= row {
-                    break;
-                }
-                sum += value * z[at as usize];
+            for (row, image) in (begin..).zip(image) {
+                let beside = |&(at, value): &(u32, f32)| f64::from(value) * x[at as usize];
+                *image = self.diagonal[row] * x[row] + self.beside.row(row).iter().map(beside).sum::<DVec3>();
+                sum += x[row] * *image;
             }
-            z[row] -= sum * self.inverse[row];
-        }
-        z
+            sum
+        })
+    }
+
+    /// One sweep of Gauss-Seidel down the rows of each block and one up, from zero: symmetric, as conjugate gradients
+    /// ask. Returns the result times `r`.
+    fn precondition(&self, r: &[DVec3], result: &mut [DVec3]) -> DVec3 {
+        blocks(result, |begin, z| {
+            for k in 0..z.len() {
+                let mut sum = r[begin + k];
+                for &(at, value) in self.beside.row(begin + k) {
+                    let at = at as usize;
+                    if at >= begin + k {
+                        break;
+                    }
+                    if at >= begin {
+                        sum -= f64::from(value) * z[at - begin];
+                    }
+                }
+                z[k] = sum / self.diagonal[begin + k];
+            }
+            let mut product = DVec3::ZERO;
+            for k in (0..z.len()).rev() {
+                let mut sum = DVec3::ZERO;
+                for &(at, value) in self.beside.row(begin + k).iter().rev() {
+                    let at = at as usize;
+                    if at <= begin + k {
+                        break;
+                    }
+                    if at < begin + z.len() {
+                        sum += f64::from(value) * z[at - begin];
+                    }
+                }
+                z[k] -= sum / self.diagonal[begin + k];
+                product += z[k] * r[begin + k];
+            }
+            product
+        })
     }
 }
 
-/// The rows of a square matrix, columns rising, from entries `([row, column], value)`; those of one place add up.
-fn rows(count: usize, mut entries: Vec<([u32; 2], f64)>) -> Rows<(u32, f64)> {
-    // Stable, so that what adds up does so in one order.
-    entries.sort_by_key(|&(place, _)| place);
-    entries.dedup_by(|next, sum| {
-        let same = next.0 == sum.0;
-        sum.1 += if same { next.1 } else { 0.0 };
-        same
-    });
-    let pairs: Vec<_> = entries.into_iter().map(|([row, column], value)| (row, (column, value))).collect();
-    Rows::from_pairs(count, pairs.iter().copied())
+/// Works on the blocks of a vector, each with where it begins, and adds up what comes of them, in their order.
+fn blocks(vector: &mut [DVec3], work: impl Fn(usize, &mut [DVec3]) -> DVec3 + Sync) -> DVec3 {
+    let numbered = vector.par_chunks_mut(BLOCK).enumerate();
+    let sums: Vec<DVec3> = numbered.map(|(block, part)| work(block * BLOCK, part)).collect();
+    sums.into_iter().sum()
 }
 
-/// The cotangents of a triangle's angles and its area; zeros if it is degenerate.
-fn angles([a, b, c]: [DVec3; 3]) -> ([f64; 3], f64) {
+fn each(vector: &mut [DVec3], change: impl Fn(usize, &mut DVec3) + Sync) {
+    vector.par_iter_mut().with_min_len(BLOCK).enumerate().for_each(|(i, value)| change(i, value));
+}
+
+/// The rows of the symmetric matrix that has minus each triangle's weights at its sides, those opposite its corners;
+/// columns rising, those of one place added up.
+fn beside(count: usize, triangles: &[[u32; 3]], weights: &[[f64; 3]]) -> Rows<(u32, f32)> {
+    let sides = triangles.iter().zip(weights).flat_map(|(&[a, b, c], &[of_a, of_b, of_c])| {
+        let sides = [(b, c, of_a), (c, b, of_a), (c, a, of_b), (a, c, of_b), (a, b, of_c), (b, a, of_c)];
+        sides.map(|(row, column, weight)| (row, (column, weight)))
+    });
+    let sides = sides.filter(|&(row, (column, _))| row != column);
+    let by_row = Rows::from_pairs(count, sides);
+    let mut own = Vec::new();
+    let mut merged: Vec<(u32, (u32, f32))> = Vec::with_capacity(3 * triangles.len() + count);
+    for row in 0..count {
+        own.clear();
+        own.extend_from_slice(by_row.row(row));
+        // Stable, so that what adds up does so in one order.
+        own.sort_by_key(|&(column, _)| column);
+        for one in own.chunk_by(|one, next| one.0 == next.0) {
+            let sum: f64 = one.iter().map(|&(_, weight)| weight).sum();
+            merged.push((row as u32, (one[0].0, -sum as f32)));
+        }
+    }
+    Rows::from_pairs(count, merged.iter().copied())
+}
+
+/// The cotangents of a triangle's angles, each times `factor`, and its area; zeros if it is degenerate.
+fn angles([a, b, c]: [DVec3; 3], factor: f64) -> ([f64; 3], f64) {
     let twice_area = (b - a).cross(c - a).length();
     if twice_area < DEGENERATE {
         return ([0.0; 3], 0.0);
     }
     let cotangents = [(b - a).dot(c - a), (c - b).dot(a - b), (a - c).dot(b - c)];
-    (cotangents.map(|d| d / twice_area), twice_area / 2.0)
-}
-
-fn dot(a: &[DVec3], b: &[DVec3]) -> DVec3 {
-    a.iter().zip(b).map(|(&a, &b)| a * b).sum()
+    (cotangents.map(|d| factor * d / twice_area), twice_area / 2.0)
 }
 
 /// `a / b` per coordinate, and zero where a coordinate is already solved.

@@ -3,13 +3,12 @@ use std::borrow::Cow;
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-use super::border::Border;
 use super::scan_quality::ScanQuality;
 use super::spacing::Spacing;
 use super::statistics::{maximum, mean, quantile};
 use super::surface::{Surface, UnitSpace};
 use super::surface_figures::{Pairs, SEEDS, flipped_share, sliver_share};
-use crate::mesh::TriangleMesh;
+use crate::mesh::{Rim, Topology, TriangleMesh};
 use crate::spatial::{Hit, self_intersections};
 
 /// Samples drawn from each surface: enough for the 99th percentile, and quick.
@@ -99,20 +98,28 @@ impl Fidelity {
     pub fn of_part(scan: &TriangleMesh, is_data: impl Fn(&[u32; 3]) -> bool, mesh: &TriangleMesh) -> Self {
         let whole = scan;
         let scan = whole.only(whole.triangles().iter().copied().filter(&is_data).collect());
-        let quality = ScanQuality::of(&scan);
-        let spacing = Spacing::of(mesh);
-        let meeting = self_intersections(mesh.positions(), mesh.triangles());
         let space = UnitSpace::of(&scan);
-        let masked = matches!(scan, Cow::Owned(_)).then(|| Surface::new(whole, &space));
-        let [scan, mesh] = [&*scan, mesh].map(|mesh| Surface::new(mesh, &space));
-        let is_whole = masked.is_none();
+        let is_whole = matches!(scan, Cow::Borrowed(_));
+        let ((quality, rim), scan) = rayon::join(
+            || {
+                let topology = Topology::of(&scan);
+                let rim = if is_whole { Rim::of(&topology) } else { Rim::of(&Topology::of(whole)) };
+                (ScanQuality::of(&scan, &topology), rim)
+            },
+            || Surface::new(&scan, &space),
+        );
+        let masked = (!is_whole).then(|| Surface::new(whole, &space));
         let whole = masked.as_ref().unwrap_or(&scan);
-        let border = Border::of(whole.positions.len(), whole.triangles);
-        let counts =
-            |hit: &Hit| (is_whole || is_data(&whole.triangles[hit.triangle as usize])) && !border.holds(hit);
-        let end = Border::of(mesh.positions.len(), mesh.triangles);
+        let topology = Topology::of(mesh);
+        let (spacing, end) = (Spacing::of(mesh, &topology), Rim::of(&topology));
+        let meeting = self_intersections(mesh.positions(), mesh.triangles());
+        let mesh = Surface::new(mesh, &space);
+        let is_inside = |rim: &Rim, hit: &Hit| !rim.contains(hit.triangle, hit.weights);
+        let counts = |hit: &Hit| {
+            (is_whole || is_data(&whole.triangles[hit.triangle as usize])) && is_inside(&rim, hit)
+        };
         let reach = if is_patch(&mesh) { PATCH_REACH * PATCH_REACH } else { f32::INFINITY };
-        let is_over = |hit: &Hit| !end.holds(hit) && hit.distance_squared <= reach;
+        let is_over = |hit: &Hit| is_inside(&end, hit) && hit.distance_squared <= reach;
         let onto_mesh = Pairs::between(&scan, &mesh, SAMPLES, SEEDS[0], is_over);
         let onto_scan = Pairs::between(&mesh, whole, SAMPLES, SEEDS[1], counts);
         let normal = (mean(&onto_mesh.turns) + mean(&onto_scan.turns)) / 2.0;

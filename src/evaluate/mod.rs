@@ -1,7 +1,6 @@
 //! Figures that say how good a result is: how closely a mesh lies on its scan, and how well the same point of the
 //! shared mesh marks the same anatomical point on every scan. Layer 3.
 
-mod border;
 mod correspondence;
 mod curvature;
 mod dense_points;

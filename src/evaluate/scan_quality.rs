@@ -29,15 +29,14 @@ pub struct ScanQuality {
 }
 
 impl ScanQuality {
-    /// Measures a scan.
-    pub fn of(scan: &TriangleMesh) -> Self {
-        let topology = Topology::of(scan);
+    /// Measures a scan of this topology.
+    pub fn of(scan: &TriangleMesh, topology: &Topology) -> Self {
         let p = scan.positions();
         let lengths: Vec<f64> =
             topology.edges.iter().map(|e| p[e[0] as usize].distance(p[e[1] as usize])).collect();
         let step = p.len().div_ceil(MOST);
         let looked_at = (0..p.len()).into_par_iter().step_by(step);
-        let offsets: Vec<f64> = looked_at.filter_map(|i| offset(&topology, p, i)).collect();
+        let offsets: Vec<f64> = looked_at.filter_map(|i| offset(topology, p, i)).collect();
         let median = |values: &[f64]| if values.is_empty() { 0.0 } else { quantile(values, 0.5) };
         let radius = scan.radius_about(scan.centroid());
         let noise = median(&offsets) / NOISE_TO_OFFSET;
@@ -76,6 +75,11 @@ mod tests {
     use crate::mesh::Icosphere;
     use crate::numeric::Random;
 
+    fn measured(positions: Vec<DVec3>, triangles: Vec<[u32; 3]>) -> ScanQuality {
+        let mesh = TriangleMesh::new(positions, triangles).unwrap();
+        ScanQuality::of(&mesh, &Topology::of(&mesh))
+    }
+
     #[test]
     fn noise_along_the_normal_is_found_again() {
         let Icosphere { positions, triangles } = Icosphere::new(5);
@@ -84,16 +88,16 @@ mod tests {
         let mut normal = || (0..12).map(|_| random.unit()).sum::<f64>() - 6.0;
         for noise in [0.05, 0.2] {
             let noisy = positions.iter().map(|&p| p * (10.0 + noise * normal())).collect();
-            let found = ScanQuality::of(&TriangleMesh::new(noisy, triangles.clone()).unwrap());
+            let found = measured(noisy, triangles.clone());
             assert!((found.noise / noise - 1.0).abs() < 0.1, "{noise} {found:?}");
         }
         let smooth = positions.iter().map(|&p| p * 10.0).collect();
-        let found = ScanQuality::of(&TriangleMesh::new(smooth, triangles.clone()).unwrap());
+        let found = measured(smooth, triangles.clone());
         assert!((found.radius - 10.0).abs() < 1e-9 && (found.edge - 0.36).abs() < 0.03, "{found:?}");
         assert!(found.noise < 0.01 && (found.spikes, found.rim) == (0.0, 0.0), "{found:?}");
         let spiked =
             positions.iter().enumerate().map(|(i, &p)| if i % 100 == 0 { p * 13.0 } else { p * 10.0 });
-        let found = ScanQuality::of(&TriangleMesh::new(spiked.collect(), triangles).unwrap());
+        let found = measured(spiked.collect(), triangles);
         // A spike's six neighbours are off the surface that it pulls at.
         assert!(found.noise < 0.02 && (found.spikes - 0.07).abs() < 0.01, "{found:?}");
     }

@@ -18,9 +18,8 @@ pub struct Spacing {
 }
 
 impl Spacing {
-    /// Measures a mesh.
-    pub fn of(mesh: &TriangleMesh) -> Self {
-        let topology = Topology::of(mesh);
+    /// Measures a mesh of this topology.
+    pub fn of(mesh: &TriangleMesh, topology: &Topology) -> Self {
         let p = mesh.positions();
         let lengths: Vec<f64> =
             topology.edges.iter().map(|e| p[e[0] as usize].distance(p[e[1] as usize])).collect();
@@ -46,19 +45,24 @@ mod tests {
     use super::*;
     use crate::mesh::Icosphere;
 
+    fn measured(positions: Vec<DVec3>, triangles: Vec<[u32; 3]>) -> Spacing {
+        let mesh = TriangleMesh::new(positions, triangles).unwrap();
+        Spacing::of(&mesh, &Topology::of(&mesh))
+    }
+
     #[test]
     fn a_sphere_is_even_and_a_box_of_few_triangles_is_bent() {
         let Icosphere { positions, triangles } = Icosphere::new(4);
-        let even = Spacing::of(&TriangleMesh::new(positions.clone(), triangles.clone()).unwrap());
+        let even = measured(positions.clone(), triangles.clone());
         assert!(even.longest < 1.3 && even.bent == 0.0, "{even:?}");
         let long = |p: &DVec3| if p.z > 0.99 { *p * 9.0 } else { *p };
         let spiked = positions.iter().map(long).collect();
-        let spiked = Spacing::of(&TriangleMesh::new(spiked, triangles).unwrap());
+        let spiked = measured(spiked, triangles);
         assert!(spiked.longest > 10.0 && spiked.bent > 0.001, "{spiked:?}");
         let corners = (0..8).map(|k| DVec3::new(f64::from(k & 1), f64::from(k >> 1 & 1), f64::from(k >> 2)));
         let faces = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
         let halves = faces.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
-        let cube = Spacing::of(&TriangleMesh::new(corners.collect(), halves).unwrap());
+        let cube = measured(corners.collect(), halves);
         assert!((cube.bent - 12.0 / 18.0).abs() < 1e-9, "{cube:?}");
     }
 }

@@ -13,9 +13,12 @@ pub(super) fn maximum(values: &[f64]) -> f64 {
 /// # Panics
 /// Without values.
 pub(super) fn quantile(values: &[f64], at: f64) -> f64 {
-    let mut sorted = values.to_vec();
-    sorted.sort_unstable_by(f64::total_cmp);
-    let place = at * (sorted.len() - 1) as f64;
-    let (below, above) = (sorted[place.floor() as usize], sorted[place.ceil() as usize]);
-    below + (above - below) * place.fract()
+    let place = at * (values.len() - 1) as f64;
+    let mut values = values.to_vec();
+    let (_, &mut below, later) = values.select_nth_unstable_by(place.floor() as usize, f64::total_cmp);
+    let between = place.fract();
+    match later.iter().copied().min_by(f64::total_cmp) {
+        Some(above) if between > 0.0 => below + (above - below) * between,
+        _ => below,
+    }
 }

@@ -1,12 +1,11 @@
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-use super::border::Border;
 use super::curvature::curvature;
 use super::samples::Samples;
 use super::statistics::{maximum, mean, quantile};
 use super::surface::{Surface, UnitSpace};
-use crate::mesh::TriangleMesh;
+use crate::mesh::{Rim, Topology, TriangleMesh};
 use crate::spatial::Hit;
 
 /// Samples drawn from each surface.
@@ -49,14 +48,17 @@ pub struct SurfaceFigures {
 /// rightly go on past the scan's rim.
 pub fn surface_figures(scan: &TriangleMesh, mesh: &TriangleMesh, open: bool) -> SurfaceFigures {
     let space = UnitSpace::of(scan);
-    let (scan, mesh) = (Surface::new(scan, &space), Surface::new(mesh, &space));
-    let border = Border::of(scan.positions.len(), scan.triangles);
+    let (rim, (scan, mesh)) = rayon::join(
+        || Rim::of(&Topology::of(scan)),
+        || (Surface::new(scan, &space), Surface::new(mesh, &space)),
+    );
+    let is_data = |hit: &Hit| !rim.contains(hit.triangle, hit.weights);
 
     let onto_mesh = Pairs::between(&scan, &mesh, SAMPLES, SEEDS[0], |_| true);
     let (mut chamfer, mut normal, mut largest) =
         (mean(&onto_mesh.distances), mean(&onto_mesh.turns), maximum(&onto_mesh.distances));
     if !open {
-        let onto_scan = Pairs::between(&mesh, &scan, SAMPLES, SEEDS[1], |hit| !border.holds(hit));
+        let onto_scan = Pairs::between(&mesh, &scan, SAMPLES, SEEDS[1], is_data);
         chamfer += mean(&onto_scan.distances);
         normal = (normal + mean(&onto_scan.turns)) / 2.0;
         largest = largest.max(maximum(&onto_scan.distances));
@@ -69,7 +71,7 @@ pub fn surface_figures(scan: &TriangleMesh, mesh: &TriangleMesh, open: bool) -> 
         top20: onto_mesh.means_at_the_top(&felt, 0.8),
         top5: onto_mesh.means_at_the_top(&felt, 0.95),
         hausdorff: largest.sqrt(),
-        flipped: flipped_share(&mesh, &scan, |hit| !border.holds(hit)),
+        flipped: flipped_share(&mesh, &scan, is_data),
         sliver: sliver_share(&mesh),
         vertices: mesh.positions.len(),
         triangles: mesh.triangles.len(),

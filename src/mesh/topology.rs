@@ -80,15 +80,11 @@ impl Topology {
         }
         // Edges are sorted: with smaller neighbours before larger ones, rows come out ascending.
         let smaller = edges.iter().map(|&[a, b]| (b, a));
-        let pairs: Vec<(u32, u32)> = smaller.chain(edges.iter().map(|&[a, b]| (a, b))).collect();
-        let neighbours = Rows::from_pairs(vertices, pairs.iter().copied());
-        let mut corners = Vec::with_capacity(3 * triangles.len());
-        for (t, corner) in triangles.iter().enumerate() {
-            for k in 0..3 {
-                corners.push((corner[k], [t as u32, corner[(k + 1) % 3], corner[(k + 2) % 3]]));
-            }
-        }
-        let fans = Rows::from_pairs(vertices, corners.iter().copied());
+        let larger = edges.iter().map(|&[a, b]| (a, b));
+        let neighbours = Rows::from_pairs(vertices, smaller.chain(larger));
+        let corners =
+            (0..).zip(triangles).flat_map(|(t, &[a, b, c])| [(a, [t, b, c]), (b, [t, c, a]), (c, [t, a, b])]);
+        let fans = Rows::from_pairs(vertices, corners);
         Self { triangles: triangles.to_vec(), edges, edge_triangles, neighbours, fans, on_rim }
     }
 
@@ -113,17 +109,11 @@ impl Topology {
 
 /// Undirected edges, sorted, with the first and last triangle at each.
 fn edges_of(vertices: usize, triangles: &[[u32; 3]]) -> (Vec<[u32; 2]>, Vec<[u32; 2]>) {
-    let mut sides = Vec::with_capacity(3 * triangles.len());
-    for (t, corner) in triangles.iter().enumerate() {
-        for k in 0..3 {
-            let (a, b) = (corner[k], corner[(k + 1) % 3]);
-            if a != b {
-                sides.push((a.min(b), [a.max(b), t as u32]));
-            }
-        }
-    }
+    let sides = (0..).zip(triangles).flat_map(|(t, &[a, b, c])| {
+        [(a, b), (b, c), (c, a)].map(|(a, b): (u32, u32)| (a.min(b), [a.max(b), t]))
+    });
     // By the smaller vertex first: many small sorts take a fraction of a large one.
-    let mut sides = Rows::from_pairs(vertices, sides.iter().copied());
+    let mut sides = Rows::from_pairs(vertices, sides.filter(|&(smaller, [larger, _])| smaller != larger));
     let mut edges: Vec<[u32; 2]> = Vec::with_capacity(sides.items.len() / 2);
     let mut edge_triangles: Vec<[u32; 2]> = Vec::with_capacity(sides.items.len() / 2);
     for smaller in 0..vertices {

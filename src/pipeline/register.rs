@@ -100,7 +100,8 @@ pub enum RegisterError {
 /// Fewer common landmarks than these do not fix a rotation of the sphere.
 pub const LEAST_LANDMARKS: usize = 3;
 
-/// Fits the sphere to one scan, stage 1 alone; returns positions `[N, 3]` in the scan's space.
+/// Fits the sphere to one scan, stage 1 alone; returns positions `[N, 3]` in the scan's space, and the scan as it was made
+/// ready.
 ///
 /// # Errors
 /// [`Canceled`] if the observer asked to stop.
@@ -109,12 +110,12 @@ pub fn fit_scan(
     mesh: &TriangleMesh,
     settings: &FitSettings,
     observer: &dyn Observer,
-) -> Result<Vec<DVec3>, Canceled> {
+) -> Result<(Vec<DVec3>, ScanSurface), Canceled> {
     let scan = ScanSurface::new(mesh, SAMPLES);
     let iterations = settings.levels.iter().map(|level| level.iterations).sum();
     let watch = Watch { observer, stage: Stage::Fit, scan: name, iterations };
     let positions = fit(&scan, settings, &[], &watch)?;
-    Ok(positions.into_iter().map(|p| scan.to_scan(p)).collect())
+    Ok((positions.into_iter().map(|p| scan.to_scan(p)).collect(), scan))
 }
 
 /// Registers a collection: fit, resample, register, and rounds of the groupwise stage.

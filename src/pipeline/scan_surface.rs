@@ -73,7 +73,7 @@ impl ScanSurface {
         let (centre, radius) = frame(mesh, weights.as_deref());
         let positions: Vec<Vec3A> =
             mesh.positions().iter().map(|p| (rotation * (*p - centre) / radius).as_vec3a()).collect();
-        let (index, (topology, normals, samples, open)) = rayon::join(
+        let (index, (walk, rim, normals, samples, open)) = rayon::join(
             || SurfaceIndex::new(&positions, mesh.triangles()),
             || {
                 let topology = Topology::of(mesh);
@@ -84,7 +84,7 @@ impl ScanSurface {
                     if open { Some(off_the_rim(&topology, weights.as_deref())) } else { weights.clone() };
                 let surface = Sampled { positions: &positions, normals: &normals, curvatures: &curvatures };
                 let samples = surface.samples(mesh.triangles(), weights.as_deref(), samples);
-                (topology, normals, samples, open)
+                (SurfaceWalk::new(&topology), Rim::of(&topology), normals, samples, open)
             },
         );
         Self {
@@ -92,12 +92,12 @@ impl ScanSurface {
             radius,
             rotation,
             index,
-            walk: SurfaceWalk::new(&topology),
+            walk,
             positions,
             samples,
             open,
             normals: normals.vertices,
-            rim: Rim::of(&topology),
+            rim,
             weights,
         }
     }
@@ -116,6 +116,12 @@ impl ScanSurface {
     /// From unit space to the scan's.
     pub fn to_scan(&self, point: Vec3A) -> DVec3 {
         self.rotation.transpose() * point.as_dvec3() * self.radius + self.centre
+    }
+
+    /// How far points `[N]` in unit space lie from it, in the scan's units.
+    pub fn distances(&self, points: &[Vec3A]) -> Vec<f64> {
+        let distance = |p: &Vec3A| self.radius * f64::from(self.index.closest(*p).distance_squared).sqrt();
+        points.par_iter().map(distance).collect()
     }
 
     /// Sample number `k`, counted round.

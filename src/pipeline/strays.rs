@@ -20,10 +20,10 @@ pub fn without_strays(mesh: &TriangleMesh) -> Result<Option<(TriangleMesh, Vec<u
     let areas = areas(mesh, &pieces);
     let largest = areas.iter().copied().fold(0.0, f64::max);
     let is_part = |t: usize| areas[pieces[mesh.triangles()[t][0] as usize] as usize] >= PART * largest;
-    let (parts, small): (Vec<usize>, Vec<usize>) = (0..mesh.triangles().len()).partition(|&t| is_part(t));
-    if small.is_empty() {
+    if (0..mesh.triangles().len()).all(is_part) {
         return Ok(None);
     }
+    let (parts, small): (Vec<usize>, Vec<usize>) = (0..mesh.triangles().len()).partition(|&t| is_part(t));
     let near = near_pieces(mesh, &pieces, &parts, &small);
     let kept: Vec<[u32; 3]> = mesh
         .triangles()

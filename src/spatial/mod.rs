@@ -17,4 +17,4 @@ mod triangle_pair;
 pub use self_intersection::{SelfIntersections, self_intersections};
 pub use surface_index::{Hit, SurfaceIndex};
 pub use surface_walk::SurfaceWalk;
-pub use triangle::{Feature, TrianglePoint, closest_on_triangle};
+pub use triangle::{TrianglePoint, closest_on_triangle};

@@ -2,7 +2,7 @@
 
 use glam::Vec3A;
 
-use super::{Feature, Hit, SurfaceIndex, SurfaceWalk, closest_on_triangle};
+use super::{Hit, SurfaceIndex, SurfaceWalk, closest_on_triangle};
 use crate::mesh::Topology;
 
 /// A small generator (splitmix64), so that the tests need no crate for it.
@@ -109,16 +109,44 @@ fn triangle_agrees_with_dense_search() {
 }
 
 #[test]
-fn triangle_names_its_features() {
+fn weights_are_zero_away_from_the_side_or_corner_that_is_hit() {
     let corners = [Vec3A::ZERO, Vec3A::X, Vec3A::Y];
-    let feature = |x: f32, y: f32| Feature::of(closest_on_triangle(Vec3A::new(x, y, 3.0), corners).weights);
-    assert_eq!(feature(0.2, 0.3), Feature::Face);
-    assert_eq!(feature(0.4, -0.1), Feature::Edge(0));
-    assert_eq!(feature(0.8, 0.9), Feature::Edge(1));
-    assert_eq!(feature(-0.1, 0.4), Feature::Edge(2));
-    assert_eq!(feature(-0.1, -0.4), Feature::Vertex(0));
-    assert_eq!(feature(3.0, -0.4), Feature::Vertex(1));
-    assert_eq!(feature(-0.4, 2.0), Feature::Vertex(2));
+    let hit = |x: f32, y: f32| {
+        closest_on_triangle(Vec3A::new(x, y, 3.0), corners).weights.map(|weight| i32::from(weight != 0.0))
+    };
+    assert_eq!(hit(0.2, 0.3), [1, 1, 1]);
+    assert_eq!(hit(0.4, -0.1), [1, 1, 0]);
+    assert_eq!(hit(0.8, 0.9), [0, 1, 1]);
+    assert_eq!(hit(-0.1, 0.4), [1, 0, 1]);
+    assert_eq!(hit(-0.1, -0.4), [1, 0, 0]);
+    assert_eq!(hit(3.0, -0.4), [0, 1, 0]);
+    assert_eq!(hit(-0.4, 2.0), [0, 0, 1]);
+}
+
+#[test]
+fn a_surface_whose_tree_is_built_in_parts_agrees_with_brute_force() {
+    // More triangles than are built into one tree.
+    let (positions, triangles) = bumpy_sphere(400);
+    let index = SurfaceIndex::new(&positions, &triangles);
+    let mut random = Random(11);
+    for _ in 0..24 {
+        let p = 1.2 * random.point();
+        let hit = index.closest(p);
+        assert_coherent(&hit, &positions, &triangles, p);
+        let least = brute_distance(&positions, &triangles, p);
+        assert!(
+            (hit.distance_squared - least).abs() <= 1e-6 * least.max(1e-6),
+            "{} {least}",
+            hit.distance_squared
+        );
+    }
+    // Every triangle has its place.
+    for triangle in (0..triangles.len() as u32).step_by(997) {
+        let [a, b, c] = corners(&positions, triangles[triangle as usize]);
+        let centre = (a + b + c) / 3.0;
+        assert!(index.closest_on(centre, triangle).distance_squared < 1e-12);
+        assert!(index.closest(centre).distance_squared < 1e-12);
+    }
 }
 
 #[test]
@@ -302,7 +330,7 @@ fn walk_stops_at_a_rim() {
     let p = Vec3A::new(0.1, 0.2, -5.0);
     let hit = walk.closest_oriented(&positions, p, Vec3A::Z, 0.0, -1.0, 3).unwrap();
     assert_coherent_far(&hit, &positions, half, p);
-    assert!(matches!(Feature::of(hit.weights), Feature::Edge(_) | Feature::Vertex(_)));
+    assert!(hit.weights.contains(&0.0));
 }
 
 #[test]

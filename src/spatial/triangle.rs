@@ -16,32 +16,6 @@ pub struct TrianglePoint {
     pub distance_squared: f32,
 }
 
-/// Which part of a triangle a point with barycentric weights lies on.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Feature {
-    /// The inside.
-    Face,
-    /// The edge from this corner (0, 1, 2) to the next.
-    Edge(usize),
-    /// This corner.
-    Vertex(usize),
-}
-
-impl Feature {
-    /// Reads the feature off the weights that are exactly zero.
-    pub fn of(weights: [f32; 3]) -> Self {
-        match weights.map(|w| w > 0.0) {
-            [true, true, true] => Self::Face,
-            [true, true, false] => Self::Edge(0),
-            [false, true, true] => Self::Edge(1),
-            [true, false, true] => Self::Edge(2),
-            [_, false, false] => Self::Vertex(0),
-            [false, true, false] => Self::Vertex(1),
-            [false, false, true] => Self::Vertex(2),
-        }
-    }
-}
-
 /// The point of the triangle `corners` nearest to `p`; on a degenerate triangle, of its edges.
 ///
 /// Projects with cross products where Ericson (Real-Time Collision Detection, 5.1.5) subtracts products of dot

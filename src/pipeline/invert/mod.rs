@@ -183,7 +183,7 @@ impl<'a> Scene<'a> {
             return Ok(sphere.rest.iter().map(|p| *p * self.start_radius as f32).collect());
         };
         let fit = Settings::for_fit(Preset::Default, sphere.rest.len())?.fit;
-        let fitted = fit_scan("hull", &surface, &fit, observer)?;
+        let (fitted, _) = fit_scan("hull", &surface, &fit, observer)?;
         let mut positions: Vec<Vec3A> = fitted.into_iter().map(|p| self.space.to_unit(p)).collect();
         // The hull's cells leave steps that only many iterations would wear off.
         let smoothing = sphere.reparameterization(settings.hull_diffusion);
