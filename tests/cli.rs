@@ -4,7 +4,7 @@ mod common;
 
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::{Command, Output, Stdio};
 
 use common::{QUICK, command, quick_register, write_collection};
 use onemesh::formats::{MeshFile, Sha256, obj_bytes, read_landmarks, read_mesh, write_landmarks};
@@ -51,6 +51,23 @@ fn the_doctor_says_what_draws() {
     assert!(String::from_utf8_lossy(&output.stdout).contains("graphics adapters:"));
     let said = complaint(&output);
     assert!(said.contains("no such card") || said.contains("mesa-vulkan-drivers"), "{said}");
+}
+
+#[test]
+fn a_reader_that_stops_before_the_end_is_no_error() {
+    let mut running = command().arg("openapi").stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    // The document is longer than what a pipe holds: some of it is yet to be written.
+    drop(running.stdout.take());
+    assert_eq!(succeeded(&running.wait_with_output().unwrap()), "");
+}
+
+#[test]
+fn a_full_disk_at_standard_output_is_an_error() {
+    let Ok(full) = fs::OpenOptions::new().write(true).open("/dev/full") else {
+        return println!("skipped: there is no /dev/full");
+    };
+    let output = command().arg("openapi").stdout(full).stderr(Stdio::piped()).spawn().unwrap();
+    assert!(complaint(&output.wait_with_output().unwrap()).contains("standard output"));
 }
 
 #[test]

@@ -20,11 +20,11 @@ impl Audit {
     /// Does it.
     pub fn run(self) -> anyhow::Result<()> {
         let Reading { subjects, failed, .. } = read(&self.collection)?;
-        failed.iter().for_each(|FailedScan { name, problem }| eprintln!("{name}: left out: {problem}"));
+        failed.iter().for_each(|FailedScan { name, problem }| remark!("{name}: left out: {problem}"));
         anyhow::ensure!(!subjects.is_empty(), "{}: no scan is left to audit", self.collection.display());
         let audit = audit_landmarks(&subjects);
         if self.json {
-            println!("{}", serde_json::to_string_pretty(&audit)?);
+            say!("{}", serde_json::to_string_pretty(&audit)?);
         } else {
             print(&self.collection, &audit);
         }
@@ -34,9 +34,9 @@ impl Audit {
 
 fn print(collection: &Path, audit: &LandmarkAudit) {
     let wrong = audit.scans.iter().filter(|scan| !scan.findings.is_empty()).count();
-    println!("{}: {wrong} of {} scans need a look", collection.display(), audit.scans.len());
+    say!("{}: {wrong} of {} scans need a look", collection.display(), audit.scans.len());
     for scan in audit.scans.iter().filter(|scan| !scan.findings.is_empty()) {
-        println!("{}", scan.name);
+        say!("{}", scan.name);
         print_findings(&scan.findings);
     }
     let mut spread: Vec<(&String, &f64)> = audit.spread.iter().collect();
@@ -44,10 +44,6 @@ fn print(collection: &Path, audit: &LandmarkAudit) {
     let widest: Vec<String> =
         spread.iter().take(6).map(|(name, spread)| format!("`{name}` {:.1} %", 100.0 * **spread)).collect();
     if !widest.is_empty() {
-        println!(
-            "{} landmarks; most spread, in the face's radius: {}",
-            audit.spread.len(),
-            widest.join(", ")
-        );
+        say!("{} landmarks; most spread, in the face's radius: {}", audit.spread.len(), widest.join(", "));
     }
 }

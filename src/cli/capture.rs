@@ -67,7 +67,7 @@ impl Capture {
         let photographs = capture(&mesh, &settings, &mut *renderer, &ProgressBars::new())?;
         let encoding = if shown == Shown::Shaded { Encoding::Srgb } else { Encoding::Linear };
         write_capture(&self.output, &photographs, encoding)?;
-        println!("{} pictures: {}", photographs.len(), self.output.display());
+        say!("{} pictures: {}", photographs.len(), self.output.display());
         Ok(())
     }
 }

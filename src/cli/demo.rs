@@ -43,7 +43,7 @@ impl Demo {
         let settings = self.parameters.for_registration()?;
         let heads = Sculptor::new(self.seed).collection(usize::from(self.count), &STRENGTHS);
         let collection = write_heads(&heads, &self.output)?;
-        println!("{} heads are sculpted: {}", heads.len(), collection.display());
+        say!("{} heads are sculpted: {}", heads.len(), collection.display());
         if self.scans_only {
             return Ok(());
         }
@@ -52,9 +52,11 @@ impl Demo {
         Summary::of(&results)?.print(&results, start.elapsed());
         let figures = correspondence(&heads, &outcome)?;
         if let Some(distances) = figures.distances {
-            println!(
+            say!(
                 "the same vertex marks the same point to within {:.2} mm on average ({:.2} median, {:.2} for 95 %)",
-                distances.mean_mm, distances.median_mm, distances.p95_mm
+                distances.mean_mm,
+                distances.median_mm,
+                distances.p95_mm
             );
         }
         Ok(())

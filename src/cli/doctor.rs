@@ -17,18 +17,18 @@ pub struct Doctor {
 impl Doctor {
     /// Does it.
     pub fn run(self) -> anyhow::Result<()> {
-        println!("onemesh {}", env!("CARGO_PKG_VERSION"));
+        say!("onemesh {}", env!("CARGO_PKG_VERSION"));
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
-        println!("processors: {cores}, threads: {}", rayon::current_num_threads());
-        println!("processor: {}, with {}", std::env::consts::ARCH, listed(features()));
+        say!("processors: {cores}, threads: {}", rayon::current_num_threads());
+        say!("processor: {}, with {}", std::env::consts::ARCH, listed(features()));
         let found = adapters();
-        println!("graphics adapters:{}", if found.is_empty() { " none" } else { "" });
+        say!("graphics adapters:{}", if found.is_empty() { " none" } else { "" });
         for adapter in &found {
-            println!("  {adapter}");
+            say!("  {adapter}");
         }
         let mut chosen = open(&self.adapter)?;
         let picture = picture(&mut *chosen).context("the chosen adapter cannot draw")?;
-        println!("chosen ({}): {}", self.adapter, chosen.adapter());
+        say!("chosen ({}): {}", self.adapter, chosen.adapter());
         let wanted = self::picture(&mut *open(&AdapterChoice::Reference)?)?;
         let off = (picture - wanted).abs();
         ensure!(
@@ -36,7 +36,7 @@ impl Doctor {
             "the chosen adapter draws a sphere with a loss of {picture}, and it is {wanted}: choose another by \
              --adapter, \"reference\" for one"
         );
-        println!("it draws as it should");
+        say!("it draws as it should");
         Ok(())
     }
 }

@@ -52,7 +52,7 @@ impl Evaluate {
             Some(What::Correspondence(correspondence)) => correspondence.figures()?,
             None => surface(&self.files, self.open)?,
         };
-        println!("{}", serde_json::to_string_pretty(&figures)?);
+        say!("{}", serde_json::to_string_pretty(&figures)?);
         Ok(())
     }
 }

@@ -3,18 +3,18 @@ use onemesh::preflight::{Finding, Severity};
 /// Prints findings, or that there are none.
 pub fn print_findings(findings: &[Finding]) {
     if findings.is_empty() {
-        println!("  nothing is wrong");
+        say!("  nothing is wrong");
     }
     for finding in findings {
         let Finding { code, severity, found, advice, .. } = finding;
-        println!("  {:8}    {found} [{}]", severity.name(), code.name());
-        println!("              -> {advice}");
+        say!("  {:8}    {found} [{}]", severity.name(), code.name());
+        say!("              -> {advice}");
     }
 }
 
 /// Warns, on the error stream, of what may spoil a registration.
 pub fn warn(scan: &str, findings: &[Finding]) {
     for finding in findings.iter().filter(|finding| finding.severity > Severity::Info) {
-        eprintln!("{scan}: {finding}");
+        remark!("{scan}: {finding}");
     }
 }

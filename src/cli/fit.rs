@@ -35,7 +35,7 @@ impl Fit {
         let name = self.scan.file_stem().map_or("scan".into(), |stem| stem.to_string_lossy());
         let start = Instant::now();
         let (positions, surface) = fit_scan(&name, &scan, &settings.fit, &ProgressBars::new())?;
-        eprintln!("fitted in {:.2} s", start.elapsed().as_secs_f64());
+        remark!("fitted in {:.2} s", start.elapsed().as_secs_f64());
         let level = settings.fit.levels.last().map_or(0, |level| level.level);
         let sphere = Icosphere::new(level);
         let topology = Topology::new(sphere.positions.len(), &sphere.triangles);
@@ -56,7 +56,7 @@ impl Fit {
         for (format, path) in outputs {
             write_whole(&path, &result.bytes(format, None).map_err(|error| error.in_file(&path))?)?;
         }
-        println!("{}", serde_json::to_string_pretty(&surface_figures(&scan, &mesh, false))?);
+        say!("{}", serde_json::to_string_pretty(&surface_figures(&scan, &mesh, false))?);
         Ok(())
     }
 }

@@ -48,7 +48,7 @@ impl Formats {
             match (tried, source.map(MeshSource::extension)) {
                 (Some(Ok(_)), Some("obj" | "ply" | "gltf")) => formats.push(OutputFormat::Template),
                 (Some(Err(error)), Some("obj" | "ply" | "gltf")) => {
-                    eprintln!("results are written as GLB alone, not as the template's own file: {error}");
+                    remark!("results are written as GLB alone, not as the template's own file: {error}");
                 }
                 _ => {}
             }

@@ -15,7 +15,7 @@ impl Health {
     pub fn run(self) -> anyhow::Result<()> {
         let client = Client::new(self.server, None, Duration::ZERO);
         let health: serde_json::Value = json(client.get("/readyz", &[])?)?;
-        println!("{}: {}", client.server(), health["status"].as_str().unwrap_or_default());
+        say!("{}: {}", client.server(), health["status"].as_str().unwrap_or_default());
         Ok(())
     }
 }

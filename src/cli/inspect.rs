@@ -25,10 +25,10 @@ impl Inspect {
         let landmarks = self.landmarks.map(read_landmarks).transpose()?;
         let inspection = Inspection::new(&mesh, landmarks.as_ref());
         if self.json {
-            println!("{}", serde_json::to_string_pretty(&inspection)?);
+            say!("{}", serde_json::to_string_pretty(&inspection)?);
             return Ok(());
         }
-        println!("{}", self.scan.display());
+        say!("{}", self.scan.display());
         print_figures(&inspection);
         print_findings(&inspection.findings);
         Ok(())
@@ -39,29 +39,29 @@ fn print_figures(inspection: &Inspection) {
     let Inspection { vertices, triangles, min, max, area, .. } = inspection;
     let extent = [0, 1, 2].map(|axis| max[axis] - min[axis]);
     let [x, y, z] = extent;
-    println!("  surface     {vertices} vertices, {triangles} triangles, area {area:.4}");
-    println!("  extent      {x:.4} x {y:.4} x {z:.4}, from {min:.4?} to {max:.4?}");
-    println!("  unit        {}", unit(&inspection.unit));
-    println!("  axes        {}", axes(&inspection.axes));
-    println!("  parts       {}", inspection.component_count);
+    say!("  surface     {vertices} vertices, {triangles} triangles, area {area:.4}");
+    say!("  extent      {x:.4} x {y:.4} x {z:.4}, from {min:.4?} to {max:.4?}");
+    say!("  unit        {}", unit(&inspection.unit));
+    say!("  axes        {}", axes(&inspection.axes));
+    say!("  parts       {}", inspection.component_count);
     for part in inspection.components.iter().filter(|_| inspection.component_count > 1) {
-        println!("              {} triangles, area {:.4}", part.triangles, part.area);
+        say!("              {} triangles, area {:.4}", part.triangles, part.area);
     }
-    println!("  rims        {}", inspection.boundary_loop_count);
+    say!("  rims        {}", inspection.boundary_loop_count);
     for rim in &inspection.boundary_loops {
-        println!("              {} vertices, length {:.4}", rim.vertices, rim.length);
+        say!("              {} vertices, length {:.4}", rim.vertices, rim.length);
     }
     let outward = match inspection.outward {
         Some(true) => "outwards",
         Some(false) => "inwards",
         None => "not clear: the surface has no inside",
     };
-    println!("  normals     {outward}");
+    say!("  normals     {outward}");
     if let Some(landmarks) = &inspection.landmarks {
         let scheme = landmarks.scheme.as_deref().unwrap_or("of an unknown scheme");
         let farthest = landmarks.farthest_from_surface;
         let farthest = farthest.map_or(String::new(), |d| format!(", at most {d:.4} off the surface"));
-        println!("  landmarks   {} of {}, {scheme}{farthest}", landmarks.present, landmarks.named);
+        say!("  landmarks   {} of {}, {scheme}{farthest}", landmarks.present, landmarks.named);
     }
 }
 

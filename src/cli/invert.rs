@@ -112,7 +112,7 @@ impl Invert {
         let mut renderer = open(&self.adapter.parse::<AdapterChoice>()?)?;
         let bars = ProgressBars::new();
         let views = read(&capture, &settings, &bars)?;
-        eprintln!("{} views, drawn by {}", views.photographs.len(), renderer.adapter());
+        remark!("{} views, drawn by {}", views.photographs.len(), renderer.adapter());
         let found = invert(&views, &settings, &mut *renderer, &bars)
             .with_context(|| capture.cameras.display().to_string())?;
         let name = self.output.file_stem().map_or("mesh".into(), |stem| stem.to_string_lossy());
@@ -174,7 +174,7 @@ fn read(capture: &Capture, settings: &InvertSettings, bars: &ProgressBars) -> an
 
 fn summary(found: &Inversion) {
     let report = &found.report;
-    println!(
+    say!(
         "{} vertices; silhouettes overlap by {:.2} %, pixels differ by {:.4} on average; {:.1} s",
         found.mesh.positions().len(),
         100.0 * report.overlap,
@@ -182,6 +182,6 @@ fn summary(found: &Inversion) {
         report.seconds.values().sum::<f64>()
     );
     for warning in &report.warnings {
-        println!("- {warning}");
+        say!("- {warning}");
     }
 }

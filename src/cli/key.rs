@@ -69,12 +69,12 @@ impl Action {
                     ScopeName::Write => Scope::Write,
                 };
                 let (key, secret) = keys.create(&name, scope).await?;
-                eprintln!("key {} for {name}, to {}; it is shown this once:", key.id, scope.name());
-                println!("{secret}");
+                remark!("key {} for {name}, to {}; it is shown this once:", key.id, scope.name());
+                say!("{secret}");
             }
             Self::List => list(&keys).await?,
             Self::Revoke { id } => ensure!(keys.revoke(&id).await?, "there is no key {id} that holds"),
-            Self::WebhookSecret => println!("{}", WebhookOutbox::new(database.clone()).secret().await?),
+            Self::WebhookSecret => say!("{}", WebhookOutbox::new(database.clone()).secret().await?),
         }
         Ok(())
     }
@@ -83,7 +83,7 @@ impl Action {
 async fn list(keys: &ApiKeys) -> Result<(), StoreError> {
     for key in keys.list().await? {
         let holds = if key.revoked_at.is_some() { "revoked" } else { key.scope.name() };
-        println!("{}  {holds:7}  {}", key.id, key.name);
+        say!("{}  {holds:7}  {}", key.id, key.name);
     }
     Ok(())
 }

@@ -1,5 +1,8 @@
 //! The commands, one a file. On top of all layers; alone in naming clap, anyhow and indicatif.
 
+#[macro_use]
+mod output;
+
 mod audit;
 mod bench;
 mod capture;
@@ -56,7 +59,7 @@ pub fn finish(outcome: anyhow::Result<()>) -> ExitCode {
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: {error:#}");
+            remark!("error: {error:#}");
             if error.is::<summary::LeftOut>() { ExitCode::from(PARTIAL) } else { ExitCode::FAILURE }
         }
     }

@@ -5,7 +5,7 @@ pub struct Openapi {}
 impl Openapi {
     /// Does it.
     pub fn run(self) -> anyhow::Result<()> {
-        print!("{}", onemesh::http::openapi_json());
+        say!("{}", onemesh::http::openapi_json().trim_end());
         Ok(())
     }
 }

@@ -27,7 +27,7 @@ impl ProgressBars {
         if self.on_terminal {
             spinner.enable_steady_tick(Duration::from_millis(120));
         } else {
-            eprintln!("{message}");
+            remark!("{message}");
         }
         spinner
     }
@@ -57,7 +57,7 @@ impl Observer for ProgressBars {
             self.draw(progress);
         } else if progress.iteration == progress.iterations {
             let Progress { stage, scan, iterations, energy, .. } = progress;
-            eprintln!("{stage:<10} {scan}: {iterations} iterations, energy {energy:.3e}");
+            remark!("{stage:<10} {scan}: {iterations} iterations, energy {energy:.3e}");
         }
     }
 }

@@ -80,7 +80,7 @@ pub fn register_collection(
     let Reading { subjects, inputs, failed } = reading.registrable(template);
     let seconds = start.elapsed().as_secs_f64();
     spinner.finish_and_clear();
-    failed.iter().for_each(|FailedScan { name, problem }| eprintln!("{name}: left out: {problem}"));
+    failed.iter().for_each(|FailedScan { name, problem }| remark!("{name}: left out: {problem}"));
     ensure!(!subjects.is_empty(), "{}: no scan is left to register", collection.display());
     spare_inputs(output, &subjects, &inputs, &outputs)?;
     let prechecks = precheck(&subjects);

@@ -24,14 +24,14 @@ impl Serve {
     pub fn run(self) -> anyhow::Result<()> {
         let config = self.listening.over(self.config.read()?);
         if self.print_config {
-            print!("{}", config.to_toml());
+            say!("{}", config.to_toml().trim_end());
             return Ok(());
         }
         let _logging = logging::start(&config.log)?;
         let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().build();
         runtime.context("no threads can be started")?.block_on(async {
             let service = Service::open(config).await?;
-            println!("listening on http://{}", service.address());
+            say!("listening on http://{}", service.address());
             service.run(stop()).await;
             Ok(())
         })

@@ -39,7 +39,7 @@ impl SpanExport {
 impl Drop for SpanExport {
     fn drop(&mut self) {
         if let Some(Err(error)) = self.0.take().map(|provider| provider.shutdown()) {
-            eprintln!("the last spans were not exported: {error}");
+            remark!("the last spans were not exported: {error}");
         }
     }
 }

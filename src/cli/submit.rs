@@ -52,7 +52,7 @@ impl Submit {
         let parameters = self.asked()?;
         let template = self.template.files()?;
         let (collection, refused) = Collection::open_usable(&self.collection)?;
-        refused.iter().for_each(|refused| eprintln!("{}: left out: {}", refused.name, refused.error));
+        refused.iter().for_each(|refused| remark!("{}: left out: {}", refused.name, refused.error));
         spare_inputs(&self.output, collection.members())?;
         let client = self.server.reach()?;
         let template = template.map(|template| send_template(&client, &template)).transpose()?;
@@ -154,9 +154,9 @@ fn send_scans(client: &Client, members: &[Member]) -> anyhow::Result<Vec<AskedSc
         bar.inc(1);
         match &sent {
             Ok(scan) => scan.report.findings.iter().filter(|finding| finding.warns()).for_each(|finding| {
-                bar.suspend(|| eprintln!("{name}: {finding}"));
+                bar.suspend(|| remark!("{name}: {finding}"));
             }),
-            Err(problem) => bar.suspend(|| eprintln!("{name}: left out: {problem}")),
+            Err(problem) => bar.suspend(|| remark!("{name}: left out: {problem}")),
         }
         Ok(sent.ok().map(|scan| AskedScan { id: scan.id, name: name.clone() }))
     };
@@ -194,7 +194,7 @@ fn counting_bar(doing: &'static str, length: usize) -> ProgressBar {
 fn register(client: &Client, asked: &Asked) -> anyhow::Result<Registration> {
     let (begun, is_new) = ask_for(client, asked)?;
     let word = if is_new { "asked for" } else { "found as it was asked for before" };
-    eprintln!("registration {} is {word}: {}/v1/registrations/{0}", begun.id, client.server());
+    remark!("registration {} is {word}: {}/v1/registrations/{0}", begun.id, client.server());
     let names = asked.scans.iter().map(|scan| (scan.id.clone(), scan.name.clone())).collect();
     let mut bars = WatchedBars::new(names);
     let ended = watch(client, &begun.id, &mut bars);

@@ -60,7 +60,7 @@ impl Summary {
         for scan in &self.scans {
             let distance =
                 |figure: fn(&Distances) -> Option<f64>| or_none(scan.scan_to_mesh.as_ref().and_then(figure));
-            println!(
+            say!(
                 "{:widest$}  {:6}  distance median {:.3e}, 99 % {:.3e}; landmarks {:.3e}; flipped {:.2} %, sliver {:.2} %",
                 scan.name,
                 scan.verdict,
@@ -71,14 +71,14 @@ impl Summary {
                 100.0 * or_none(scan.sliver),
             );
             for Reason { code, verdict, found, advice } in &scan.reasons {
-                println!("{:widest$}  - {verdict}: {code}: {found}; {advice}", "");
+                say!("{:widest$}  - {verdict}: {code}: {found}; {advice}", "");
             }
         }
         let [pass, review, fail] =
             [Verdict::Pass, Verdict::Review, Verdict::Fail].map(|verdict| self.count(verdict));
-        println!("{pass} pass, {review} to review, {fail} failed");
-        println!("{} scans in {:.1} s: {}", self.scans.len(), took.as_secs_f64(), output.display());
-        println!("look at {}", output.join("sheet.png").display());
+        say!("{pass} pass, {review} to review, {fail} failed");
+        say!("{} scans in {:.1} s: {}", self.scans.len(), took.as_secs_f64(), output.display());
+        say!("look at {}", output.join("sheet.png").display());
     }
 
     /// How the program is to end, where `earlier` scans were left out before the registration.

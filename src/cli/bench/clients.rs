@@ -202,7 +202,7 @@ impl Found {
         self.latencies.sort_unstable();
         let last = self.latencies.len() - 1;
         let at = |share: f64| self.latencies[(last as f64 * share) as usize].as_secs_f64() * 1e3;
-        println!(
+        say!(
             "\n{} answers: median {:.1} ms, p99 {:.1} ms, longest {:.1} ms",
             self.latencies.len(),
             at(0.5),

@@ -19,7 +19,7 @@ impl Clock {
 
     /// Prints the table's head.
     pub fn head(&self) {
-        println!("| what | median | fastest | runs |\n|---|---:|---:|---:|");
+        say!("| what | median | fastest | runs |\n|---|---:|---:|---:|");
     }
 
     /// Times a stage of seconds, after one run that fills caches.
@@ -55,7 +55,7 @@ impl Clock {
 /// Prints one row.
 pub fn row(what: &str, times: &[Duration]) {
     let fastest = times.iter().min().copied().unwrap_or_default();
-    println!("| {what} | {} | {} | {} |", shown(median(times)), shown(fastest), times.len());
+    say!("| {what} | {} | {} | {} |", shown(median(times)), shown(fastest), times.len());
 }
 
 /// The median; of an even number, the longer one in the middle.

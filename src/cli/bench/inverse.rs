@@ -76,10 +76,10 @@ impl Inverse {
 
     /// Runs it on meshes, or the program's own scenes.
     pub fn run(&self, inputs: &[PathBuf]) -> anyhow::Result<()> {
-        println!(
+        say!(
             "| scene | vertices | way | chamfer | normal | top 5 % distance | top 5 % normal | overlap | MAE | s |"
         );
-        println!("|---|---|---|---|---|---|---|---|---|---|");
+        say!("|---|---|---|---|---|---|---|---|---|---|");
         let mut rows = Vec::new();
         for (name, mesh) in scenes(inputs)? {
             rows.extend(self.scene(&name, &mesh)?);
@@ -100,7 +100,7 @@ impl Inverse {
                 let found = invert(&views, &settings, &mut *renderer, &())?;
                 let seconds = start.elapsed().as_secs_f64();
                 let figures = surface_figures(mesh, &found.mesh, false);
-                println!(
+                say!(
                     "| {name} | {vertices} | {} | {:.3e} | {:.4} | {:.3e} | {:.4} | {:.4} | {:.5} | {seconds:.0} |",
                     way.name(),
                     figures.chamfer,
@@ -162,7 +162,7 @@ fn compare(rows: &[Row], way: Way) {
     let [chamfer, normal, distance, top_normal] =
         [0, 1, 2, 3].map(|k| mean(&|one: &Row, other: &Row| one.figures[k] / other.figures[k]));
     let seconds = mean(&|one, other| one.seconds / other.seconds);
-    println!(
+    say!(
         "| {} scenes | | {} / off | {chamfer:.3} | {normal:.3} | {distance:.3} | {top_normal:.3} | | | {seconds:.2} |",
         pairs.len(),
         way.name(),

@@ -43,7 +43,7 @@ impl WatchedBars {
         if self.on_terminal {
             self.whole.set_message(line.to_owned());
         } else {
-            eprintln!("{line}");
+            remark!("{line}");
         }
     }
 }
@@ -71,7 +71,7 @@ impl Watcher for WatchedBars {
                 match (problem, verdict) {
                     (Some(problem), _) if *status == Status::Failed => {
                         let line = format!("{name}: left out: {}", problem.detail);
-                        self.bars.suspend(|| eprintln!("{line}"));
+                        self.bars.suspend(|| remark!("{line}"));
                     }
                     (_, Some(verdict)) => self.say(&format!("{name}: {verdict}")),
                     _ => {}
