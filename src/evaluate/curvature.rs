@@ -59,17 +59,11 @@ impl Smoothing {
     /// Solves for the smoothed positions by conjugate gradients started at `v`; the three coordinates run side by side.
     fn apply(&self, v: &[DVec3]) -> Vec<DVec3> {
         let mut x = v.to_vec();
-        let mut residual = vec![DVec3::ZERO; v.len()];
-        let mut conditioned = residual.clone();
-        let mut image = residual.clone();
-        let enough = {
-            let wanted = |i: usize| self.mass[i] * v[i];
-            each(&mut residual, |i, r| *r = wanted(i));
-            let whole = self.precondition(&residual, &mut conditioned);
-            self.product(v, &mut image);
-            each(&mut residual, |i, r| *r = wanted(i) - image[i]);
-            whole * TOLERANCE * TOLERANCE
-        };
+        let mut residual: Vec<DVec3> = v.iter().zip(&self.mass).map(|(&v, &m)| m * v).collect();
+        let [mut conditioned, mut image] = [vec![DVec3::ZERO; v.len()], vec![DVec3::ZERO; v.len()]];
+        let enough = self.precondition(&residual, &mut conditioned) * TOLERANCE * TOLERANCE;
+        self.product(v, &mut image);
+        each(&mut residual, |i, r| *r -= image[i]);
         let mut left = self.precondition(&residual, &mut conditioned);
         let mut direction = conditioned.clone();
         for _ in 0..MOST_STEPS {

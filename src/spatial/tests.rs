@@ -125,8 +125,8 @@ fn weights_are_zero_away_from_the_side_or_corner_that_is_hit() {
 
 #[test]
 fn a_surface_whose_tree_is_built_in_parts_agrees_with_brute_force() {
-    // More triangles than are built into one tree.
-    let (positions, triangles) = bumpy_sphere(400);
+    // More triangles than are built into one tree, and so are those of its quarters.
+    let (positions, triangles) = bumpy_sphere(520);
     let index = SurfaceIndex::new(&positions, &triangles);
     let mut random = Random(11);
     for _ in 0..24 {
