@@ -1,7 +1,6 @@
 //! One step from its claim to its end.
 
 use std::collections::{BTreeMap, HashMap};
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -65,7 +64,7 @@ pub(super) struct Engine {
     /// Residuals of the latest results that nobody has asked for yet.
     pub residuals: Mutex<Vec<f64>>,
     /// Workers that go from step to step.
-    pub busy: AtomicUsize,
+    pub busy: watch::Sender<usize>,
 }
 
 /// How a step came to its end.
@@ -118,7 +117,7 @@ impl Engine {
             closing: watch::Sender::new(false),
             spent: Mutex::default(),
             residuals: Mutex::default(),
-            busy: AtomicUsize::new(0),
+            busy: watch::Sender::new(0),
         })
     }
 
@@ -328,7 +327,7 @@ impl Engine {
     /// Commits a change with the tickets for the steps that it made ready, and tells of it.
     pub async fn commit(&self, mut tx: Transaction<'_, Sqlite>, changed: Changed) -> Result<(), StoreError> {
         // Workers that are at it go on by themselves.
-        let idle = self.settings.threads.saturating_sub(self.busy.load(Ordering::Relaxed));
+        let idle = self.settings.threads.saturating_sub(*self.busy.borrow());
         queue::push(&mut tx, changed.ready.min(idle)).await?;
         tx.commit().await?;
         let dropped = changed.dropped.clone();

@@ -101,8 +101,11 @@ impl Jobs {
         self.engine.stop_all();
         let mut work = self.work.lock().await;
         let all = async { while work.join_next().await.is_some() {} };
-        let _ = tokio::time::timeout(CLOSING, all).await;
-        work.abort_all();
+        if tokio::time::timeout(CLOSING, all).await.is_err() {
+            tracing::warn!("steps have not stopped in time: they are begun anew at the next start");
+        }
+        // Whatever held the data folder has let go of it then.
+        work.shutdown().await;
     }
 
     /// How it stands.

@@ -4,7 +4,6 @@
 //! on, and starts a worker again that fails.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
 use apalis::prelude::*;
@@ -13,6 +12,7 @@ use apalis_sqlite::{Config, SqliteStorage};
 use futures_util::{Stream, StreamExt};
 use serde::{Deserialize, Serialize};
 use sqlx::sqlite::SqliteConnection;
+use tokio::sync::watch;
 
 use super::database::Database;
 use super::engine::Engine;
@@ -21,6 +21,9 @@ use super::store_error::StoreError;
 const QUEUE: &str = "steps";
 /// How long a worker waits for a sign before it looks for tickets itself.
 const LOOK: Duration = Duration::from_millis(250);
+/// How long tickets may take to be told that they are used up when the program ends.
+const TICKETS: Duration = Duration::from_secs(1);
+
 /// Some step is ready.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 struct Ticket {}
@@ -104,7 +107,7 @@ pub(super) async fn recover(engine: &Engine) -> Result<(), StoreError> {
 /// Works on tickets until the program ends.
 pub(super) async fn work(engine: Arc<Engine>) {
     let boot = uuid::Uuid::now_v7().simple().to_string();
-    let mut closing = engine.closing.subscribe();
+    let (mut closing, mut busy) = (engine.closing.subscribe(), engine.busy.subscribe());
     let monitor = Monitor::new().register(move |restarts| {
         let config = Config::default().queue(QUEUE).batch_size(1).persist_results(false);
         let config = config.heartbeat_interval(Duration::from_secs(5)).missed_heartbeats(3);
@@ -122,11 +125,15 @@ pub(super) async fn work(engine: Arc<Engine>) {
         tracing::warn!(%error, "the queue's worker failed and is started again");
         true
     });
+    // Only when no worker is at a step: apalis, once told, leaves what it asks of the database unfinished until its workers
+    // have ended, and they may wait for that very connection. The senders live as long as the engine.
     let closed = async move {
-        // The sender lives as long as the engine.
         let _ = closing.wait_for(|closing| *closing).await;
+        let _ = busy.wait_for(|busy| *busy == 0).await;
         Ok(())
     };
+    // What may still wait then is that a ticket is told to be used up, which nobody needs.
+    let monitor = monitor.shutdown_timeout(TICKETS);
     if let Err(error) = monitor.run_with_signal(closed).await {
         tracing::error!(%error, "the queue ended");
     }
@@ -166,17 +173,17 @@ async fn take(_ticket: Ticket, engine: Data<Arc<Engine>>) -> Result<(), BoxDynEr
 }
 
 /// Counts a worker that goes from step to step, until it is dropped.
-struct Busy<'a>(&'a AtomicUsize);
+struct Busy<'a>(&'a watch::Sender<usize>);
 
 impl<'a> Busy<'a> {
-    fn new(count: &'a AtomicUsize) -> Self {
-        count.fetch_add(1, Ordering::Relaxed);
+    fn new(count: &'a watch::Sender<usize>) -> Self {
+        count.send_modify(|count| *count += 1);
         Self(count)
     }
 }
 
 impl Drop for Busy<'_> {
     fn drop(&mut self) {
-        self.0.fetch_sub(1, Ordering::Relaxed);
+        self.0.send_modify(|count| *count -= 1);
     }
 }
