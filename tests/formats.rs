@@ -121,8 +121,9 @@ fn a_file_that_is_read_a_piece_at_a_time_is_the_same_whole_or_cut_short() {
         assert!(bytes.len() > 300_000);
         for end in (bytes.len() - 12..=bytes.len()).chain([262_143, 262_144, 262_145]) {
             let whole = MeshFile::parse(&bytes[..end], format).map_err(|error| error.to_string());
-            let pieces =
-                MeshFile::read_from(&bytes[..end], end as u64, None).map_err(|error| error.to_string());
+            let pieces = MeshFile::look_into(&bytes[..end], end as u64, None)
+                .map(MeshFile::from)
+                .map_err(|error| error.to_string());
             assert_eq!(pieces, whole, "{format:?} up to {end}");
         }
     }

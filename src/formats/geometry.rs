@@ -1,13 +1,12 @@
-use glam::DVec3;
-
 use super::polygons::Polygons;
 use super::texture::Texture;
+use crate::mesh::FilePoints;
 
 /// What a reader finds, before it is checked to be a mesh.
 #[derive(Debug, Default)]
 pub(super) struct Geometry {
     /// `[N, 3]`
-    pub positions: Vec<DVec3>,
+    pub positions: FilePoints,
     pub polygons: Polygons,
     /// `[N, 4]`: red, green, blue, opacity.
     pub colours: Option<Vec<[u8; 4]>>,

@@ -2,7 +2,7 @@ use std::borrow::Cow;
 use std::io::Read;
 use std::path::Path;
 
-use glam::DVec2;
+use glam::{DVec2, DVec3};
 
 use super::error::{Fault, FormatError};
 use super::geometry::{FileOrder, Geometry};
@@ -12,13 +12,15 @@ use super::polygons::Polygons;
 use super::stream::Stream;
 use super::texture::{ImageOrigin, Texture};
 use super::{gltf, obj, ply, stl, text};
-use crate::mesh::TriangleMesh;
+use crate::mesh::{FilePoints, Points, TriangleMesh};
 
 /// All that is read from a mesh file: the checked mesh, what the file has beside it, and what could not be used.
+///
+/// The mesh is in double precision, or as [`FilePoints`] where a file is only looked at.
 #[derive(Debug, Clone, PartialEq)]
-pub struct MeshFile {
+pub struct MeshFile<P = Vec<DVec3>> {
     /// The surface, in the file's own space and units.
-    pub mesh: TriangleMesh,
+    pub mesh: TriangleMesh<P>,
     /// The colour of each vertex `[N, 4]`: red, green, blue, opacity, as the file has them, scaled to 0 to 255.
     pub colours: Option<Vec<[u8; 4]>>,
     /// Texture coordinates and the pictures they belong to.
@@ -48,7 +50,7 @@ impl MeshFile {
     /// [`FormatError`] names the file, the line or element, what was found there and what to do. Colours and textures
     /// that are wrong or missing are no errors but [`warnings`](Self::warnings).
     pub fn read(path: impl AsRef<Path>) -> Result<Self, FormatError> {
-        Self::read_with_inputs(path.as_ref()).map(|(file, _)| file)
+        MeshFile::look_at(path).map(Self::from)
     }
 
     /// Reads a file as [`read`](Self::read) does, from its bytes.
@@ -56,53 +58,48 @@ impl MeshFile {
     /// # Errors
     /// [`FormatError`] without a file; [`FormatError::in_file`] adds one. A glTF whose mesh is in other files is refused.
     pub fn parse(bytes: &[u8], format: MeshFormat) -> Result<Self, FormatError> {
-        Ok(Self::of_format(&mut Stream::of(bytes), format, &Siblings::none())?)
-    }
-
-    /// Reads the `length` bytes of a file as [`read`](Self::read) does. Beside what is read of them, 256 KiB of the bytes
-    /// or the longest line are in memory at a time; of glTF all.
-    ///
-    /// # Errors
-    /// As [`parse`](Self::parse).
-    pub fn read_from(input: impl Read, length: u64, extension: Option<&str>) -> Result<Self, FormatError> {
-        let mut stream = Stream::new(input, length);
-        Ok(Self::of_stream(&mut stream, extension, &Siblings::none()).map(|(file, _)| file)?)
-    }
-
-    /// The polygons that the mesh's triangles were cut from, with the mesh's vertex indices.
-    pub fn polygons(&self) -> Cow<'_, Polygons> {
-        match &self.cut {
-            Some(polygons) => Cow::Borrowed(polygons),
-            None => Cow::Owned(Polygons::of_triangles(self.mesh.triangles())),
-        }
-    }
-
-    /// The vertex of each of the polygons' corners.
-    pub(super) fn corners(&self) -> &[u32] {
-        self.cut.as_ref().map_or(self.mesh.triangles().as_flattened(), Polygons::corners)
-    }
-
-    /// Texture coordinates `[N, 2]`, (0, 0) in the picture's upper left corner, if every vertex has one pair or none.
-    pub fn vertex_texture_coordinates(&self) -> Option<Vec<DVec2>> {
-        let texture = self.texture.as_ref()?;
-        let mut of_vertices = vec![None; self.mesh.positions().len()];
-        for (corner, &vertex) in self.corners().iter().enumerate() {
-            let own = texture.coordinate(corner)?;
-            let slot = &mut of_vertices[vertex as usize];
-            if slot.is_some_and(|other| other != own) {
-                return None;
-            }
-            *slot = Some(own);
-        }
-        let upright = |own: Option<DVec2>| match (own.unwrap_or_default(), texture.origin) {
-            (own, ImageOrigin::UpperLeft) => own,
-            (own, ImageOrigin::LowerLeft) => DVec2::new(own.x, 1.0 - own.y),
-        };
-        Some(of_vertices.into_iter().map(upright).collect())
+        Ok(MeshFile::of_format(&mut Stream::of(bytes), format, &Siblings::none())?.into())
     }
 
     /// The file at `path` and those it was read from, the first of them `path` itself; pictures are not read.
     pub(super) fn read_with_inputs(path: &Path) -> Result<(Self, Vec<InputFile>), FormatError> {
+        MeshFile::with_inputs(path).map(|(file, inputs)| (file.into(), inputs))
+    }
+
+    /// The file at `path`, which holds `bytes`; its format, and those it was read from, the first of them itself.
+    pub(super) fn of_bytes(
+        bytes: &[u8],
+        path: &Path,
+    ) -> Result<(Self, MeshFormat, Vec<InputFile>), FormatError> {
+        let siblings = Siblings::of(path);
+        let read = MeshFile::of_stream(&mut Stream::of(bytes), extension(path), &siblings);
+        let (file, format) = read.map_err(|fault| FormatError::from(fault).in_file(path))?;
+        let mut inputs = vec![InputFile::of(path, bytes)];
+        inputs.extend(siblings.into_read());
+        Ok((file.into(), format, inputs))
+    }
+}
+
+impl MeshFile<FilePoints> {
+    /// Reads a file to be looked at as [`MeshFile::read`] does.
+    ///
+    /// # Errors
+    /// As [`MeshFile::read`].
+    pub fn look_at(path: impl AsRef<Path>) -> Result<Self, FormatError> {
+        Self::with_inputs(path.as_ref()).map(|(file, _)| file)
+    }
+
+    /// Reads the `length` bytes of a file as [`look_at`](Self::look_at) does. Beside what is read of them, 256 KiB of the bytes
+    /// or the longest line are in memory at a time; of glTF all.
+    ///
+    /// # Errors
+    /// As [`MeshFile::parse`].
+    pub fn look_into(input: impl Read, length: u64, extension: Option<&str>) -> Result<Self, FormatError> {
+        let mut stream = Stream::new(input, length);
+        Ok(Self::of_stream(&mut stream, extension, &Siblings::none()).map(|(file, _)| file)?)
+    }
+
+    fn with_inputs(path: &Path) -> Result<(Self, Vec<InputFile>), FormatError> {
         let in_file = |fault| FormatError::from(fault).in_file(path);
         let mut own = HashedFile::open(path)?;
         let length = own.length;
@@ -112,19 +109,6 @@ impl MeshFile {
         let mut inputs = vec![own.finish()?];
         inputs.extend(siblings.into_read());
         Ok((file, inputs))
-    }
-
-    /// The file at `path`, which holds `bytes`; its format, and those it was read from, the first of them itself.
-    pub(super) fn of_bytes(
-        bytes: &[u8],
-        path: &Path,
-    ) -> Result<(Self, MeshFormat, Vec<InputFile>), FormatError> {
-        let siblings = Siblings::of(path);
-        let read = Self::of_stream(&mut Stream::of(bytes), extension(path), &siblings);
-        let (file, format) = read.map_err(|fault| FormatError::from(fault).in_file(path))?;
-        let mut inputs = vec![InputFile::of(path, bytes)];
-        inputs.extend(siblings.into_read());
-        Ok((file, format, inputs))
     }
 
     fn of_stream(
@@ -157,6 +141,47 @@ impl MeshFile {
         let (triangles, cut) = polygons.into_triangles();
         let mesh = TriangleMesh::new(positions, triangles)?;
         Ok(Self { mesh, cut, colours, texture, warnings, order, states_ras })
+    }
+}
+
+impl<P: Points> MeshFile<P> {
+    /// The polygons that the mesh's triangles were cut from, with the mesh's vertex indices.
+    pub fn polygons(&self) -> Cow<'_, Polygons> {
+        match &self.cut {
+            Some(polygons) => Cow::Borrowed(polygons),
+            None => Cow::Owned(Polygons::of_triangles(self.mesh.triangles())),
+        }
+    }
+
+    /// The vertex of each of the polygons' corners.
+    pub(super) fn corners(&self) -> &[u32] {
+        self.cut.as_ref().map_or(self.mesh.triangles().as_flattened(), Polygons::corners)
+    }
+
+    /// Texture coordinates `[N, 2]`, (0, 0) in the picture's upper left corner, if every vertex has one pair or none.
+    pub fn vertex_texture_coordinates(&self) -> Option<Vec<DVec2>> {
+        let texture = self.texture.as_ref()?;
+        let mut of_vertices = vec![None; self.mesh.points().count()];
+        for (corner, &vertex) in self.corners().iter().enumerate() {
+            let own = texture.coordinate(corner)?;
+            let slot = &mut of_vertices[vertex as usize];
+            if slot.is_some_and(|other| other != own) {
+                return None;
+            }
+            *slot = Some(own);
+        }
+        let upright = |own: Option<DVec2>| match (own.unwrap_or_default(), texture.origin) {
+            (own, ImageOrigin::UpperLeft) => own,
+            (own, ImageOrigin::LowerLeft) => DVec2::new(own.x, 1.0 - own.y),
+        };
+        Some(of_vertices.into_iter().map(upright).collect())
+    }
+}
+
+impl From<MeshFile<FilePoints>> for MeshFile {
+    fn from(file: MeshFile<FilePoints>) -> Self {
+        let MeshFile { mesh, colours, texture, warnings, cut, order, states_ras } = file;
+        Self { mesh: mesh.into(), colours, texture, warnings, cut, order, states_ras }
     }
 }
 

@@ -5,6 +5,7 @@ use glam::DVec3;
 use super::geometry::{FileOrder, GONE, Geometry, Numbers};
 use super::polygons::Polygons;
 use super::texture::Texture;
+use crate::mesh::{FilePoints, Points};
 
 /// Closes the seams that formats cut where normals or texture coordinates differ: of vertices on open edges that are in
 /// exactly the same place, all become the first. All polygons must be triangles.
@@ -21,12 +22,17 @@ pub(super) fn weld(geometry: Geometry) -> Geometry {
     };
     let kept: Vec<bool> = triangles.iter().map(stays).collect();
     let left: Vec<[u32; 3]> = kept_of(&triangles, &kept).map(welded).collect();
-    let renamed = renamed(&left, geometry.positions.len());
+    let renamed = renamed(&left, geometry.positions.count());
     let named: Vec<bool> = renamed.iter().map(|&index| index != GONE).collect();
     let mut polygons = Polygons::with_capacity(left.len());
     left.iter().for_each(|corners| polygons.push_triangle(corners.map(|index| renamed[index as usize])));
     Geometry {
-        positions: kept_of(&geometry.positions, &named).copied().collect(),
+        positions: geometry
+            .positions
+            .each()
+            .zip(&named)
+            .filter_map(|(p, &named)| named.then_some(p))
+            .collect(),
         colours: geometry.colours.map(|colours| kept_of(&colours, &named).copied().collect()),
         texture: geometry.texture.map(|texture| without(texture, &kept)),
         polygons,
@@ -65,11 +71,11 @@ fn numbers(kept: &[bool]) -> Numbers {
 }
 
 /// For each vertex the one that it becomes.
-fn joined(positions: &[DVec3], triangles: &[[u32; 3]]) -> Vec<u32> {
-    let open = open_vertices(positions.len(), triangles);
+fn joined(positions: &FilePoints, triangles: &[[u32; 3]]) -> Vec<u32> {
+    let open = open_vertices(positions.count(), triangles);
     let mut first_at: HashMap<[u64; 3], u32> = HashMap::new();
-    (0..positions.len())
-        .map(|i| if open[i] { *first_at.entry(place(positions[i])).or_insert(i as u32) } else { i as u32 })
+    (0..positions.count())
+        .map(|i| if open[i] { *first_at.entry(place(positions.at(i))).or_insert(i as u32) } else { i as u32 })
         .collect()
 }
 
@@ -117,9 +123,10 @@ fn renamed(triangles: &[[u32; 3]], vertices: usize) -> Vec<u32> {
 mod tests {
     use super::*;
 
-    fn geometry(positions: Vec<DVec3>, triangles: &[[u32; 3]]) -> Geometry {
+    fn geometry(positions: &[DVec3], triangles: &[[u32; 3]]) -> Geometry {
         let mut polygons = Polygons::default();
         triangles.iter().for_each(|&corners| polygons.push_triangle(corners));
+        let positions = positions.iter().copied().collect();
         Geometry { positions, polygons, ..Geometry::default() }
     }
 
@@ -127,14 +134,14 @@ mod tests {
     fn cut_tetrahedron() -> Geometry {
         let corners = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
         let faces = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]];
-        let positions = faces.iter().flatten().map(|&i: &usize| corners[i]).collect();
-        geometry(positions, &[0, 1, 2, 3].map(|t| [3 * t, 3 * t + 1, 3 * t + 2]))
+        let positions: Vec<DVec3> = faces.iter().flatten().map(|&i: &usize| corners[i]).collect();
+        geometry(&positions, &[0, 1, 2, 3].map(|t| [3 * t, 3 * t + 1, 3 * t + 2]))
     }
 
     #[test]
     fn seams_close_and_vertices_keep_their_order() {
         let welded = weld(cut_tetrahedron());
-        assert_eq!(welded.positions, [DVec3::ZERO, DVec3::Y, DVec3::X, DVec3::Z]);
+        assert_eq!(Vec::from(welded.positions), [DVec3::ZERO, DVec3::Y, DVec3::X, DVec3::Z]);
         let triangles = welded.polygons.triangles();
         assert_eq!(triangles, [[0, 1, 2], [0, 2, 3], [2, 1, 3], [1, 0, 3]]);
         assert!(open_vertices(4, &triangles).iter().all(|open| !open));
@@ -145,21 +152,21 @@ mod tests {
     #[test]
     fn enclosed_vertices_in_the_same_place_stay_two() {
         let once = weld(cut_tetrahedron());
-        let (mut positions, mut triangles) = (once.positions, once.polygons.triangles());
+        let (mut positions, mut triangles) = (Vec::from(once.positions), once.polygons.triangles());
         positions.extend_from_within(..);
         triangles.extend(triangles.clone().iter().map(|corners| corners.map(|i| i + 4)));
-        let welded = weld(geometry(positions.clone(), &triangles));
-        assert_eq!((welded.positions, welded.polygons.triangles()), (positions, triangles));
+        let welded = weld(geometry(&positions, &triangles));
+        assert_eq!((Vec::from(welded.positions), welded.polygons.triangles()), (positions, triangles));
     }
 
     #[test]
     fn what_no_triangle_names_goes_with_all_that_belongs_to_it() {
         let cut = cut_tetrahedron();
-        let mut positions = cut.positions;
+        let mut positions = Vec::from(cut.positions);
         positions.insert(0, DVec3::splat(9.0));
         let mut triangles = vec![[1, 1, 2]];
         triangles.extend(cut.polygons.triangles().iter().map(|corners| corners.map(|i| i + 1)));
-        let mut before = geometry(positions, &triangles);
+        let mut before = geometry(&positions, &triangles);
         before.colours = Some((0..13).map(|i| [i, 0, 0, 255]).collect());
         before.texture = Some(Texture {
             coordinates: Vec::new(),
@@ -169,7 +176,7 @@ mod tests {
             origin: crate::formats::ImageOrigin::UpperLeft,
         });
         let welded = weld(before);
-        assert_eq!((welded.positions.len(), welded.polygons.len()), (4, 4));
+        assert_eq!((welded.positions.count(), welded.polygons.len()), (4, 4));
         assert_eq!(welded.colours.unwrap(), [1, 2, 3, 6].map(|red| [red, 0, 0, 255]));
         let texture = welded.texture.unwrap();
         assert_eq!(texture.corners, (3..15).collect::<Vec<_>>());

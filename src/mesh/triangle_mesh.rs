@@ -2,6 +2,8 @@ use std::borrow::Cow;
 
 use glam::DVec3;
 
+use super::points::{FilePoints, Points};
+
 /// Index of a vertex in its mesh.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct VertexId(pub u32);
@@ -53,19 +55,21 @@ pub enum MeshError {
 /// A validated triangle mesh: every index in range, every position finite, some extent.
 ///
 /// Positions are `[N, 3]` in the scan's own space and units; triangles `[F, 3]`, counter-clockwise seen from outside.
+/// Positions are in double precision wherever something is computed, and as their file has them where a scan is only
+/// looked at.
 #[derive(Debug, Clone, PartialEq)]
-pub struct TriangleMesh {
-    positions: Vec<DVec3>,
+pub struct TriangleMesh<P = Vec<DVec3>> {
+    positions: P,
     triangles: Vec<[u32; 3]>,
 }
 
-impl TriangleMesh {
+impl<P: Points> TriangleMesh<P> {
     /// Checks and takes vertices `[N, 3]` and triangles `[F, 3]`.
     ///
     /// # Errors
     /// [`MeshError`] names the first vertex or triangle that is wrong.
-    pub fn new(positions: Vec<DVec3>, triangles: Vec<[u32; 3]>) -> Result<Self, MeshError> {
-        let vertices = positions.len();
+    pub fn new(positions: P, triangles: Vec<[u32; 3]>) -> Result<Self, MeshError> {
+        let vertices = positions.count();
         if vertices < 3 || triangles.is_empty() {
             return Err(MeshError::Empty { vertices, triangles: triangles.len() });
         }
@@ -73,16 +77,16 @@ impl TriangleMesh {
         if largest > i32::MAX as usize {
             return Err(MeshError::TooLarge(largest));
         }
-        if let Some(vertex) = positions.iter().position(|p| !p.is_finite()) {
-            return Err(MeshError::NotFinite { vertex, position: positions[vertex] });
+        if let Some(vertex) = positions.each().position(|p| !p.is_finite()) {
+            return Err(MeshError::NotFinite { vertex, position: positions.at(vertex) });
         }
         for (triangle, corners) in triangles.iter().enumerate() {
             if let Some(&index) = corners.iter().find(|&&i| i as usize >= vertices) {
                 return Err(MeshError::IndexOutOfRange { triangle, index, vertices });
             }
         }
-        let first = positions[triangles[0][0] as usize];
-        let extends = triangles.iter().flatten().any(|&i| positions[i as usize] != first);
+        let first = positions.at(triangles[0][0] as usize);
+        let extends = triangles.iter().flatten().any(|&i| positions.at(i as usize) != first);
         if !extends {
             return Err(MeshError::NoExtent);
         }
@@ -90,13 +94,40 @@ impl TriangleMesh {
     }
 
     /// Vertex positions `[N, 3]`.
-    pub fn positions(&self) -> &[DVec3] {
+    pub fn points(&self) -> &P {
         &self.positions
+    }
+
+    /// Where a vertex is.
+    pub fn position(&self, vertex: u32) -> DVec3 {
+        self.positions.at(vertex as usize)
     }
 
     /// Vertex indices of each triangle `[F, 3]`.
     pub fn triangles(&self) -> &[[u32; 3]] {
         &self.triangles
+    }
+
+    /// Corner positions of a triangle.
+    pub fn corners(&self, triangle: TriangleId) -> [DVec3; 3] {
+        self.triangles[triangle.0 as usize].map(|i| self.position(i))
+    }
+
+    /// The mean of the vertices.
+    pub fn centroid(&self) -> DVec3 {
+        self.positions.each().sum::<DVec3>() / self.positions.count() as f64
+    }
+
+    /// The largest distance of a vertex from `centre`.
+    pub fn radius_about(&self, centre: DVec3) -> f64 {
+        self.positions.each().map(|p| p.distance_squared(centre)).fold(0.0, f64::max).sqrt()
+    }
+}
+
+impl TriangleMesh {
+    /// Vertex positions `[N, 3]`.
+    pub fn positions(&self) -> &[DVec3] {
+        &self.positions
     }
 
     /// Some of its triangles `[F, 3]` on all its vertices; all of it if these are no mesh.
@@ -114,20 +145,11 @@ impl TriangleMesh {
     pub fn with_positions(&self, positions: Vec<DVec3>) -> Result<Self, MeshError> {
         Self::new(positions, self.triangles.clone())
     }
+}
 
-    /// Corner positions of a triangle.
-    pub fn corners(&self, triangle: TriangleId) -> [DVec3; 3] {
-        self.triangles[triangle.0 as usize].map(|i| self.positions[i as usize])
-    }
-
-    /// The mean of the vertices.
-    pub fn centroid(&self) -> DVec3 {
-        self.positions.iter().sum::<DVec3>() / self.positions.len() as f64
-    }
-
-    /// The largest distance of a vertex from `centre`.
-    pub fn radius_about(&self, centre: DVec3) -> f64 {
-        self.positions.iter().map(|p| p.distance_squared(centre)).fold(0.0, f64::max).sqrt()
+impl From<TriangleMesh<FilePoints>> for TriangleMesh {
+    fn from(mesh: TriangleMesh<FilePoints>) -> Self {
+        Self { positions: mesh.positions.into(), triangles: mesh.triangles }
     }
 }
 

@@ -5,7 +5,7 @@ use glam::{DVec2, DVec3, Vec3A};
 use super::mask::{MaskError, check_mask};
 use super::sphere::Sphere;
 use crate::formats::{MeshFile, Region, Scheme};
-use crate::mesh::{LandmarkSet, SurfacePoint, TriangleId, sphere_layout};
+use crate::mesh::{LandmarkSet, Points, SurfacePoint, TriangleId, sphere_layout};
 use crate::spatial::SurfaceIndex;
 
 /// What registered scans share: a shape's triangles, and where the landmarks lie on them.
@@ -29,13 +29,13 @@ pub struct Template {
 
 impl Template {
     /// A template of a mesh with landmarks in its space: each is taken to its closest point of the mesh.
-    pub fn of_file(file: &MeshFile, landmarks: &LandmarkSet) -> Self {
+    pub fn of_file<P: Points>(file: &MeshFile<P>, landmarks: &LandmarkSet) -> Self {
         let mesh = &file.mesh;
         // Nearest points are found in single precision, so about the mesh's own centre and at its own scale.
         let centre = mesh.centroid();
         let radius = mesh.radius_about(centre);
         let unit = |p: DVec3| ((p - centre) / radius).as_vec3a();
-        let positions: Vec<Vec3A> = mesh.positions().iter().map(|&p| unit(p)).collect();
+        let positions: Vec<Vec3A> = mesh.points().each().map(unit).collect();
         let index = SurfaceIndex::new(&positions, mesh.triangles());
         let place = |(name, point): (&str, DVec3)| {
             let hit = index.closest(unit(point));
@@ -43,7 +43,7 @@ impl Template {
             (name.to_owned(), SurfacePoint { triangle: TriangleId(hit.triangle), weights })
         };
         Self {
-            positions: mesh.positions().to_vec(),
+            positions: mesh.points().each().collect(),
             triangles: mesh.triangles().to_vec(),
             landmarks: landmarks.present().map(place).collect(),
             scheme: landmarks.scheme.clone(),

@@ -4,7 +4,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use crate::mesh::{Rows, TriangleMesh, components};
+use crate::mesh::{Points, Rows, TriangleMesh, components};
 
 /// How a surface's triangles hang together.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -51,11 +51,11 @@ pub struct BoundaryLoop {
 
 impl Connectivity {
     /// Of a mesh; sides of triangles that name a vertex twice are left out.
-    pub fn of(mesh: &TriangleMesh) -> Self {
+    pub fn of(mesh: &TriangleMesh<impl Points>) -> Self {
         // As many as have their corners listed at a time: the list of all would be as large as the mesh.
         const LISTED: usize = 1 << 15;
         const VERTICES: usize = 4096;
-        let (triangles, vertices) = (mesh.triangles(), mesh.positions().len());
+        let (triangles, vertices) = (mesh.triangles(), mesh.points().count());
         let (mut found, mut rim) = (Self::default(), Vec::new());
         let in_largest = found.add_components(mesh);
         for first in (0..vertices).step_by(LISTED) {
@@ -81,8 +81,8 @@ impl Connectivity {
     }
 
     /// Collects the parts, and the largest part's volume without its rims' fans; returns which vertices that part has.
-    fn add_components(&mut self, mesh: &TriangleMesh) -> Vec<bool> {
-        let part_of = components(mesh.positions().len(), mesh.triangles());
+    fn add_components(&mut self, mesh: &TriangleMesh<impl Points>) -> Vec<bool> {
+        let part_of = components(mesh.points().count(), mesh.triangles());
         // Parts are called by their first vertices, which are few.
         let firsts: Vec<u32> = (0..part_of.len() as u32).filter(|&v| part_of[v as usize] == v).collect();
         let place = |v: u32| firsts.partition_point(|&first| first < part_of[v as usize]);
@@ -92,7 +92,7 @@ impl Connectivity {
         let origin = mesh.centroid();
         for corners in mesh.triangles() {
             let part = place(corners[0]);
-            let [a, b, c] = corners.map(|i| mesh.positions()[i as usize] - origin);
+            let [a, b, c] = corners.map(|i| mesh.position(i) - origin);
             parts[part].triangles += 1;
             parts[part].area += (b - a).cross(c - a).length() / 2.0;
             volumes[part] += a.dot(b.cross(c));
@@ -110,8 +110,8 @@ impl Connectivity {
     }
 
     /// Chains rim edges to loops, and closes those of the largest part for its volume.
-    fn add_loops(&mut self, mesh: &TriangleMesh, rim: &[[u32; 2]], in_largest: &[bool]) {
-        let place = |v: u32| mesh.positions()[v as usize];
+    fn add_loops(&mut self, mesh: &TriangleMesh<impl Points>, rim: &[[u32; 2]], in_largest: &[bool]) {
+        let place = |v: u32| mesh.position(v);
         let origin = mesh.centroid();
         for edges in chains(rim) {
             let count = edges.len() as f64;

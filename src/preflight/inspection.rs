@@ -9,7 +9,7 @@ use super::frame::{Axes, Basis, UnitGuess, between_eyes};
 use super::scan_landmarks::{LandmarkFigures, inspect_landmarks};
 use super::triangles;
 use crate::formats::Scheme;
-use crate::mesh::{LandmarkSet, TriangleMesh};
+use crate::mesh::{LandmarkSet, Points, TriangleMesh};
 
 /// Components and boundary loops that are listed, the largest of them; all are counted.
 const LISTED: usize = 16;
@@ -66,7 +66,7 @@ pub struct Inspection {
 
 impl Inspection {
     /// Looks at a scan and, if there are any, its landmarks in the same space.
-    pub fn new(mesh: &TriangleMesh, landmarks: Option<&LandmarkSet>) -> Self {
+    pub fn new(mesh: &TriangleMesh<impl Points>, landmarks: Option<&LandmarkSet>) -> Self {
         let connectivity = Connectivity::of(mesh);
         let (min, max) = bounds(mesh);
         let scheme = landmarks.and_then(|set| Scheme::named(set.scheme.as_deref()?));
@@ -82,7 +82,7 @@ impl Inspection {
         let clear = connectivity.largest_volume.abs() > hollow;
         let mut inspection = Self {
             findings: Vec::new(),
-            vertices: mesh.positions().len(),
+            vertices: mesh.points().count(),
             triangles: mesh.triangles().len(),
             min: min.to_array(),
             max: max.to_array(),
@@ -210,7 +210,7 @@ impl Inspection {
 }
 
 /// The box around the vertices that triangles name.
-fn bounds(mesh: &TriangleMesh) -> (DVec3, DVec3) {
-    let corners = mesh.triangles().iter().flatten().map(|&i| mesh.positions()[i as usize]);
+fn bounds(mesh: &TriangleMesh<impl Points>) -> (DVec3, DVec3) {
+    let corners = mesh.triangles().iter().flatten().map(|&i| mesh.position(i));
     corners.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(min, max), p| (min.min(p), max.max(p)))
 }

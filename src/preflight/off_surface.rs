@@ -3,7 +3,7 @@ use std::collections::BTreeMap;
 use glam::{DVec3, Vec3A};
 use rayon::prelude::*;
 
-use crate::mesh::{LandmarkSet, TriangleMesh};
+use crate::mesh::{LandmarkSet, Points, TriangleMesh};
 use crate::spatial::{SurfaceIndex, closest_on_triangle};
 
 /// For more points than this it pays to sort the triangles first.
@@ -17,43 +17,51 @@ pub fn landmark_distances(mesh: &TriangleMesh, landmarks: &LandmarkSet) -> BTree
 }
 
 /// How far each point is from a surface, in the surface's units; NaN for one that is missing.
-pub(super) fn distances_from_surface(mesh: &TriangleMesh, points: &[Option<DVec3>]) -> Vec<f64> {
+pub(super) fn distances_from_surface(mesh: &TriangleMesh<impl Points>, points: &[Option<DVec3>]) -> Vec<f64> {
     let there = points.iter().flatten().count();
     let all = |distance: &(dyn Fn(DVec3) -> f64 + Sync)| {
         points.par_iter().map(|point| point.map_or(f64::NAN, distance)).collect()
     };
     if there <= FEW {
-        let reaches = reaches(mesh);
-        return all(&|point| scanned(mesh, &reaches, point));
+        let farthest = farthest_reach(mesh);
+        return all(&|point| scanned(mesh, farthest, point));
     }
     let centre = mesh.centroid();
     let radius = mesh.radius_about(centre);
     // The index is in single precision: about the origin and of size one it is good for a ten-thousandth of a head.
     let enter = |p: DVec3| ((p - centre) / radius).as_vec3a();
-    let positions: Vec<Vec3A> = mesh.positions().iter().map(|&p| enter(p)).collect();
+    let positions: Vec<Vec3A> = mesh.points().each().map(enter).collect();
     let index = SurfaceIndex::new(&positions, mesh.triangles());
     all(&|point| radius * f64::from(index.closest(enter(point)).distance_squared).sqrt())
 }
 
-/// How far each triangle reaches from its first corner.
-fn reaches(mesh: &TriangleMesh) -> Vec<f64> {
-    let reach = |corners: &[u32; 3]| {
-        let [a, b, c] = corners.map(|i| mesh.positions()[i as usize]);
-        a.distance_squared(b).max(a.distance_squared(c)).sqrt()
-    };
-    mesh.triangles().par_iter().with_min_len(4096).map(reach).collect()
+/// How far a triangle reaches from its first corner, squared.
+fn reach_squared([a, b, c]: [DVec3; 3]) -> f64 {
+    a.distance_squared(b).max(a.distance_squared(c))
 }
 
-/// The distance of a point from the surface: from all triangles that begin near enough to be the nearest.
-fn scanned(mesh: &TriangleMesh, reaches: &[f64], point: DVec3) -> f64 {
-    let begins = |corners: &[u32; 3]| mesh.positions()[corners[0] as usize].distance_squared(point);
+/// How far a triangle reaches from its first corner at most.
+fn farthest_reach(mesh: &TriangleMesh<impl Points>) -> f64 {
+    let reach = |corners: &[u32; 3]| reach_squared(corners.map(|i| mesh.position(i)));
+    mesh.triangles().par_iter().with_min_len(4096).map(reach).reduce(|| 0.0, f64::max).sqrt()
+}
+
+/// The distance of a point from the surface: from all triangles that begin near enough to be the nearest, of which none
+/// reaches farther than `farthest`.
+fn scanned(mesh: &TriangleMesh<impl Points>, farthest: f64, point: DVec3) -> f64 {
+    let begins = |corners: &[u32; 3]| mesh.position(corners[0]).distance_squared(point);
     let mut nearest = mesh.triangles().iter().map(begins).fold(f64::INFINITY, f64::min).sqrt();
-    for (corners, reach) in mesh.triangles().iter().zip(reaches) {
-        let limit = nearest + reach;
-        if begins(corners) <= limit * limit {
+    for corners in mesh.triangles() {
+        let begin = begins(corners);
+        if begin > (nearest + farthest).powi(2) {
+            continue;
+        }
+        let places = corners.map(|i| mesh.position(i));
+        let limit = nearest + reach_squared(places).sqrt();
+        if begin <= limit * limit {
             // About the point and relative to the distance, single precision loses nothing that matters.
             let scale = limit.max(f64::MIN_POSITIVE);
-            let corners = corners.map(|i| ((mesh.positions()[i as usize] - point) / scale).as_vec3a());
+            let corners = places.map(|p| ((p - point) / scale).as_vec3a());
             let square = closest_on_triangle(Vec3A::ZERO, corners).distance_squared;
             nearest = nearest.min(scale * f64::from(square).sqrt());
         }

@@ -8,7 +8,7 @@ use super::finding::{Code, Finding, some_of};
 use super::frame::Axes;
 use super::off_surface::distances_from_surface;
 use crate::formats::Scheme;
-use crate::mesh::{LandmarkSet, TriangleMesh};
+use crate::mesh::{LandmarkSet, Points, TriangleMesh};
 
 /// Fewer landmarks do not turn a scan onto another.
 const LEAST: usize = 3;
@@ -32,7 +32,7 @@ pub struct LandmarkFigures {
 ///
 /// They also tell how the face is turned, if they are a face.
 pub(super) fn inspect_landmarks(
-    mesh: &TriangleMesh,
+    mesh: &TriangleMesh<impl Points>,
     set: &LandmarkSet,
 ) -> (LandmarkFigures, Option<Axes>, Vec<Finding>) {
     let distances = distances_from_surface(mesh, &set.points);

@@ -1,13 +1,12 @@
-use crate::mesh::TriangleMesh;
+use crate::mesh::{Points, TriangleMesh};
 
 /// A triangle lower than this share of its longest side has no area to speak of.
 const FLAT: f64 = 1e-6;
 
 /// How many triangles name a vertex twice or are flat.
-pub(super) fn degenerate(mesh: &TriangleMesh) -> usize {
-    let positions = mesh.positions();
+pub(super) fn degenerate(mesh: &TriangleMesh<impl Points>) -> usize {
     let is_flat = |corners: &&[u32; 3]| {
-        let [a, b, c] = corners.map(|i| positions[i as usize]);
+        let [a, b, c] = corners.map(|i| mesh.position(i));
         let longest = (b - a).length_squared().max((c - b).length_squared()).max((a - c).length_squared());
         (b - a).cross(c - a).length() <= FLAT * longest
     };

@@ -8,6 +8,7 @@ use super::document::{Node, Primitive};
 use super::surface::Surface;
 use crate::formats::error::Fault;
 use crate::formats::geometry::Geometry;
+use crate::mesh::Points;
 
 /// The triangles of a scene, in its space, and where their vertices stand in the file.
 pub(super) struct Scene {
@@ -138,7 +139,7 @@ impl Gathered<'_, '_> {
     fn vertices(&mut self, accessor: usize, transform: DMat4) -> Result<(u32, u32), Fault> {
         let positions = accessor::positions(self.buffers, accessor)?;
         let range =
-            u32::try_from(self.geometry.positions.len()).ok().zip(u32::try_from(positions.len()).ok());
+            u32::try_from(self.geometry.positions.count()).ok().zip(u32::try_from(positions.len()).ok());
         let fits = range.filter(|(first, count)| first.checked_add(*count).is_some());
         let range = fits
             .ok_or_else(|| Fault::at("the default scene", "has more vertices than 32-bit indices reach"))?;

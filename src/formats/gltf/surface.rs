@@ -9,6 +9,7 @@ use super::image::Images;
 use crate::formats::error::Fault;
 use crate::formats::geometry::Geometry;
 use crate::formats::texture::{ImageOrigin, Texture};
+use crate::mesh::Points;
 
 /// What a scene has beside its shape: colours, texture coordinates, pictures. A mistake in them ends in a warning.
 pub(super) struct Surface<'g, 'a> {
@@ -146,7 +147,7 @@ impl<'g, 'a> Surface<'g, 'a> {
     /// Adds what was found to the shape.
     pub fn finish(mut self, geometry: &mut Geometry) {
         if !self.colours.is_empty() {
-            self.colours.resize(geometry.positions.len(), WHITE);
+            self.colours.resize(geometry.positions.count(), WHITE);
             geometry.colours = Some(self.colours);
         }
         if !self.corners.is_empty() {

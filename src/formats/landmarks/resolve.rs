@@ -5,7 +5,7 @@ use crate::formats::error::{Fault, FormatError};
 use crate::formats::geometry::{GONE, Numbers};
 use crate::formats::mesh_file::MeshFile;
 use crate::formats::text::shown;
-use crate::mesh::{LandmarkSet, TriangleMesh};
+use crate::mesh::{LandmarkSet, Points, TriangleMesh};
 
 impl LandmarkFile {
     /// The landmarks' positions on their scan, in its own space.
@@ -16,7 +16,7 @@ impl LandmarkFile {
     ///
     /// # Errors
     /// [`FormatError`] names the landmark, or the line, and the vertex or triangle that the mesh does not have.
-    pub fn on(&self, mesh: &MeshFile) -> Result<LandmarkSet, FormatError> {
+    pub fn on<P: Points>(&self, mesh: &MeshFile<P>) -> Result<LandmarkSet, FormatError> {
         let on_triangles = self.maybe_on_triangles && !self.is_within(&mesh.mesh);
         let turned = self.axes.is_some_and(|axes| (axes == Axes::Ras) != mesh.states_ras);
         let position = |mark: Mark| match mark {
@@ -58,10 +58,10 @@ impl LandmarkFile {
     }
 
     /// Whether all points are within the bounds of the mesh, or as good as.
-    fn is_within(&self, mesh: &TriangleMesh) -> bool {
+    fn is_within(&self, mesh: &TriangleMesh<impl Points>) -> bool {
         const MARGIN: f64 = 0.05;
-        let low = mesh.positions().iter().copied().fold(DVec3::INFINITY, DVec3::min);
-        let high = mesh.positions().iter().copied().fold(DVec3::NEG_INFINITY, DVec3::max);
+        let low = mesh.points().each().fold(DVec3::INFINITY, DVec3::min);
+        let high = mesh.points().each().fold(DVec3::NEG_INFINITY, DVec3::max);
         let margin = DVec3::splat(MARGIN * (high - low).length());
         let within = |point: DVec3| point.cmpge(low - margin).all() && point.cmple(high + margin).all();
         self.marks.iter().flatten().all(|mark| matches!(mark, Mark::Point(point) if within(*point)))
@@ -74,7 +74,7 @@ fn turned_about(point: DVec3) -> DVec3 {
 }
 
 /// The point that `[triangle, u, v]` means.
-fn on_triangle(mark: DVec3, mesh: &MeshFile) -> Result<DVec3, Fault> {
+fn on_triangle(mark: DVec3, mesh: &MeshFile<impl Points>) -> Result<DVec3, Fault> {
     let [_, u, v] = mark.to_array();
     let index = mark.x as u64;
     let triangles = mesh.mesh.triangles();
@@ -86,22 +86,22 @@ fn on_triangle(mark: DVec3, mesh: &MeshFile) -> Result<DVec3, Fault> {
         );
         Fault::at("the landmarks", problem)
     })?;
-    let [a, b, c] = corners.map(|index| mesh.mesh.positions()[index as usize]);
+    let [a, b, c] = corners.map(|index| mesh.mesh.position(index));
     Ok(a * u + b * v + c * (1.0 - u - v))
 }
 
-fn vertex(index: u64, mesh: &MeshFile) -> Result<DVec3, String> {
+fn vertex(index: u64, mesh: &MeshFile<impl Points>) -> Result<DVec3, String> {
     let numbers = &mesh.order.vertices;
     let count = match numbers {
-        Numbers::Kept => mesh.mesh.positions().len(),
+        Numbers::Kept => mesh.mesh.points().count(),
         Numbers::Changed(numbers) => numbers.len(),
         Numbers::None => {
             return Err("but STL has no numbered vertices: give points, or the mesh as PLY or OBJ".to_owned());
         }
     };
     if usize::try_from(index).is_ok_and(|index| index < count) {
-        let there = number(numbers, index).and_then(|index| mesh.mesh.positions().get(index));
-        return there.copied().ok_or_else(|| "which is of no triangle".to_owned());
+        let there = number(numbers, index).map(|index| mesh.mesh.points().at(index));
+        return there.ok_or_else(|| "which is of no triangle".to_owned());
     }
     Err(format!("but the mesh has {count}, counted from 0"))
 }

@@ -13,7 +13,7 @@ use super::error::{Fault, FormatError};
 use super::geometry::{GONE, Numbers};
 use super::input::read_file;
 use super::mesh_file::MeshFile;
-use crate::mesh::LandmarkSet;
+use crate::mesh::{LandmarkSet, Points};
 use painted::Painted;
 
 /// A mask as its file has it, for a mesh that is not known yet.
@@ -99,7 +99,11 @@ impl MaskFile {
     /// # Errors
     /// [`FormatError`] where the mesh has not what the mask is about: as many vertices, the landmark, colours, texture
     /// coordinates; and where the mask leaves no vertex any weight.
-    pub fn on(&self, mesh: &MeshFile, landmarks: &LandmarkSet) -> Result<Vec<f32>, FormatError> {
+    pub fn on<P: Points>(
+        &self,
+        mesh: &MeshFile<P>,
+        landmarks: &LandmarkSet,
+    ) -> Result<Vec<f32>, FormatError> {
         let weights = match &self.0 {
             Source::Weights(weights) => by_vertex(weights, mesh),
             Source::Regions { spheres, outside } => in_spheres(spheres, *outside, mesh, landmarks),
@@ -115,8 +119,8 @@ impl MaskFile {
     }
 }
 
-fn by_vertex(weights: &[f32], mesh: &MeshFile) -> Result<Vec<f32>, Fault> {
-    let vertices = mesh.mesh.positions().len();
+fn by_vertex(weights: &[f32], mesh: &MeshFile<impl Points>) -> Result<Vec<f32>, Fault> {
+    let vertices = mesh.mesh.points().count();
     let in_file = match &mesh.order.vertices {
         Numbers::Kept => vertices,
         Numbers::Changed(numbers) => numbers.len(),
@@ -142,10 +146,10 @@ fn by_vertex(weights: &[f32], mesh: &MeshFile) -> Result<Vec<f32>, Fault> {
 fn in_spheres(
     spheres: &[Sphere],
     outside: f32,
-    mesh: &MeshFile,
+    mesh: &MeshFile<impl Points>,
     landmarks: &LandmarkSet,
 ) -> Result<Vec<f32>, Fault> {
-    let mut weights: Vec<Option<f32>> = vec![None; mesh.mesh.positions().len()];
+    let mut weights: Vec<Option<f32>> = vec![None; mesh.mesh.points().count()];
     for (k, Sphere { centre, radius, weight }) in spheres.iter().enumerate() {
         let centre = match centre {
             Centre::Point(point) => *point,
@@ -154,7 +158,7 @@ fn in_spheres(
                 Fault::at(format!("spheres, entry {k}, landmark"), problem)
             })?,
         };
-        for (own, position) in weights.iter_mut().zip(mesh.mesh.positions()) {
+        for (own, position) in weights.iter_mut().zip(mesh.mesh.points().each()) {
             if position.distance(centre) <= *radius {
                 *own = Some(own.map_or(*weight, |own| own.min(*weight)));
             }
@@ -167,7 +171,7 @@ fn by_colour(
     channel: Channel,
     threshold: Option<f32>,
     inverted: bool,
-    mesh: &MeshFile,
+    mesh: &MeshFile<impl Points>,
 ) -> Result<Vec<f32>, Fault> {
     let Some(colours) = &mesh.colours else {
         return Err(Fault::at("colour", "is asked for, but the mesh's file has no vertex colours"));

@@ -6,6 +6,7 @@ use png::{Decoder, Transformations};
 use crate::formats::error::Fault;
 use crate::formats::mesh_file::MeshFile;
 use crate::formats::texture::ImageOrigin;
+use crate::mesh::Points;
 
 /// Most pixels of a picture: 8192 in both directions. A small file may claim any number.
 const MOST_PIXELS: u64 = 1 << 26;
@@ -50,7 +51,7 @@ impl Painted {
     }
 
     /// The weights of a mesh's vertices `[N]`: the mean over their corners; 1 where none has texture coordinates.
-    pub fn on(&self, mesh: &MeshFile) -> Result<Vec<f32>, Fault> {
+    pub fn on(&self, mesh: &MeshFile<impl Points>) -> Result<Vec<f32>, Fault> {
         let missing = || Fault::at("the mask", "is painted, but the mesh's file has no texture coordinates");
         let texture = mesh.texture.as_ref().ok_or_else(missing)?;
         if texture.images.len() > 1 {
@@ -60,7 +61,7 @@ impl Painted {
             );
             return Err(Fault::at("the mask", problem));
         }
-        let mut sums = vec![(0.0, 0.0); mesh.mesh.positions().len()];
+        let mut sums = vec![(0.0, 0.0); mesh.mesh.points().count()];
         for (corner, &vertex) in mesh.corners().iter().enumerate() {
             if let Some(at) = texture.coordinate(corner) {
                 let (sum, count) = &mut sums[vertex as usize];

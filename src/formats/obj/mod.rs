@@ -18,6 +18,7 @@ use super::input::Siblings;
 use super::polygons::Polygons;
 use super::stream::Stream;
 use super::text::{finite, integer, shown, words};
+use crate::mesh::{FilePoints, Points};
 use surface::Surface;
 
 /// Reads all vertices in their order and all faces. Normals and texture coordinates, which faces name by indices of
@@ -48,7 +49,7 @@ fn rest(line: &[u8]) -> &[u8] {
 
 #[derive(Default)]
 struct Reader {
-    positions: Vec<DVec3>,
+    positions: FilePoints,
     polygons: Polygons,
     surface: Surface,
     /// The largest index that a face names, and its line: faces may come before their vertices.
@@ -87,12 +88,12 @@ impl Reader {
 
     /// The vertex, counted from 0, that the `name` in the corner `7`, `7/1`, `7//3`, `7/1/3` or `-1` names.
     fn index(&self, line: usize, name: &[u8], corner: &[u8]) -> Result<u32, Fault> {
-        counted_from_0(name, self.positions.len())
-            .ok_or_else(|| not_a_vertex(line, corner, self.positions.len()))
+        counted_from_0(name, self.positions.count())
+            .ok_or_else(|| not_a_vertex(line, corner, self.positions.count()))
     }
 
     fn finish(self, siblings: &Siblings) -> Result<Geometry, Fault> {
-        let vertices = self.positions.len();
+        let vertices = self.positions.count();
         if let Some((index, line)) = self.largest
             && index as usize >= vertices
         {

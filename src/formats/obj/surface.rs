@@ -8,6 +8,7 @@ use crate::formats::geometry::Geometry;
 use crate::formats::input::Siblings;
 use crate::formats::text::{finite, shown};
 use crate::formats::texture::{ImageOrigin, Texture};
+use crate::mesh::Points;
 
 /// What an OBJ has beside its shape: colours, texture coordinates, materials. A mistake in them ends in a warning.
 #[derive(Default)]
@@ -116,7 +117,7 @@ impl Surface {
     }
 
     fn colours(&self, geometry: &mut Geometry) -> Option<Vec<[u8; 4]>> {
-        let (coloured, vertices) = (self.colours.len(), geometry.positions.len());
+        let (coloured, vertices) = (self.colours.len(), geometry.positions.count());
         if coloured == 0 {
             return None;
         }

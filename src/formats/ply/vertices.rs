@@ -7,6 +7,7 @@ use crate::formats::error::Fault;
 use crate::formats::geometry::Geometry;
 use crate::formats::input::Siblings;
 use crate::formats::texture::{ImageOrigin, Texture, TextureImage};
+use crate::mesh::FilePoints;
 
 /// Where the numbers that are read stand in a row: `x y z`, then colours, then texture coordinates.
 const NUMBERS: usize = 9;
@@ -36,7 +37,7 @@ pub(super) struct VertexPlan {
 /// The vertices that were read.
 #[derive(Default)]
 pub(super) struct Vertices {
-    positions: Vec<DVec3>,
+    positions: FilePoints,
     colours: Option<Vec<[u8; 4]>>,
     coordinates: Option<Vec<DVec2>>,
 }
@@ -71,7 +72,7 @@ impl VertexPlan {
     pub fn read(&self, element: &Element, rows: &mut impl Rows) -> Result<Vertices, Fault> {
         let count = element.count as usize;
         let mut vertices = Vertices {
-            positions: Vec::with_capacity(count),
+            positions: FilePoints::with_capacity(count),
             colours: self.colour.map(|_| Vec::with_capacity(count)),
             coordinates: self.coordinates.then(|| Vec::with_capacity(count)),
         };

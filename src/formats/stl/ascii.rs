@@ -3,16 +3,17 @@ use glam::DVec3;
 use crate::formats::error::Fault;
 use crate::formats::stream::Stream;
 use crate::formats::text::{finite, shown, words};
+use crate::mesh::{FilePoints, Points};
 
 /// The corners of all triangles `[3 F]`.
-pub(super) fn read(stream: &mut Stream) -> Result<Vec<DVec3>, Fault> {
-    let mut corners = Vec::new();
+pub(super) fn read(stream: &mut Stream) -> Result<FilePoints, Fault> {
+    let mut corners = FilePoints::default();
     let mut ended = false;
     while let Some(line) = stream.line() {
         let mut words = words(line.text);
         let problem = match words.next() {
             Some(b"vertex") => corner(words).map(|point| corners.push(point)),
-            Some(b"endfacet" | b"facet" | b"endsolid") if corners.len() % 3 != 0 => {
+            Some(b"endfacet" | b"facet" | b"endsolid") if corners.count() % 3 != 0 => {
                 Err("the triangle has not three corners (`vertex x y z`)".to_owned())
             }
             // Several solids may follow one another, and a name may be any words.

@@ -2,6 +2,7 @@ use glam::DVec3;
 
 use crate::formats::error::Fault;
 use crate::formats::stream::Stream;
+use crate::mesh::FilePoints;
 
 /// Anything at all, then the count of triangles.
 const HEADER: usize = 84;
@@ -14,7 +15,7 @@ pub(super) fn has_its_length(beginning: &[u8], length: u64) -> bool {
 }
 
 /// The corners of all triangles `[3 F]`.
-pub(super) fn read(stream: &mut Stream) -> Result<Vec<DVec3>, Fault> {
+pub(super) fn read(stream: &mut Stream) -> Result<FilePoints, Fault> {
     let length = stream.left();
     let header = stream.take::<HEADER>();
     let declared = header.and_then(|header| declared(&header)).ok_or_else(|| {
@@ -31,7 +32,7 @@ pub(super) fn read(stream: &mut Stream) -> Result<Vec<DVec3>, Fault> {
     if declared > length {
         return Err(cut_short());
     }
-    let mut corners = Vec::with_capacity(3 * triangles as usize);
+    let mut corners = FilePoints::with_capacity(3 * triangles as usize);
     for number in 0..triangles {
         let triangle = stream.take::<TRIANGLE>().ok_or_else(cut_short)?;
         let (numbers, _) = triangle.as_chunks::<4>();

@@ -5,13 +5,12 @@ mod binary;
 #[cfg(test)]
 mod tests;
 
-use glam::DVec3;
-
 use super::error::Fault;
 use super::geometry::{FileOrder, Geometry, Numbers};
 use super::polygons::Polygons;
 use super::stream::Stream;
 use super::weld::weld;
+use crate::mesh::{FilePoints, Points};
 
 /// Reads all triangles. Normals and attribute bytes are passed over: the corners' order says what is outside.
 pub(super) fn read(stream: &mut Stream) -> Result<Geometry, Fault> {
@@ -44,10 +43,10 @@ fn contains(bytes: &[u8], word: &[u8]) -> bool {
 }
 
 /// Triangles that share nothing, of corners `[3 F]`.
-fn separate(positions: Vec<DVec3>) -> Result<Geometry, Fault> {
-    let corners = u32::try_from(positions.len())
+fn separate(positions: FilePoints) -> Result<Geometry, Fault> {
+    let corners = u32::try_from(positions.count())
         .map_err(|_| Fault::at("the triangles", "are more than 32-bit indices reach"))?;
-    let mut polygons = Polygons::with_capacity(positions.len() / 3);
+    let mut polygons = Polygons::with_capacity(positions.count() / 3);
     (0..corners / 3).for_each(|t| polygons.push_triangle([3 * t, 3 * t + 1, 3 * t + 2]));
     Ok(Geometry { positions, polygons, ..Geometry::default() })
 }

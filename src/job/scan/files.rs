@@ -12,7 +12,7 @@ use super::record::{MeshKind, ScanParts};
 use crate::formats::{Fault, FormatError, LandmarkFile, MaskFile, MeshFile};
 use crate::job::blobs::Blobs;
 use crate::job::store_error::StoreError;
-use crate::mesh::LandmarkSet;
+use crate::mesh::{FilePoints, LandmarkSet, Points};
 use crate::pipeline::Subject;
 use crate::preflight::Inspection;
 
@@ -35,7 +35,7 @@ pub struct ScanFiles {
 #[derive(Debug, Clone)]
 pub struct ReadScan {
     /// The mesh and all that its file says.
-    pub file: MeshFile,
+    pub file: MeshFile<FilePoints>,
     /// The landmarks, in the mesh's space.
     pub landmarks: Option<LandmarkSet>,
     /// How much each vertex counts as data `[N]`, 0 to 1.
@@ -67,7 +67,7 @@ impl ScanFiles {
             check_picture(texture, Part::Texture, limits.texture_pixels)?;
         }
         let file = self.mesh_file(limits, scratch)?;
-        check_count(file.mesh.positions().len(), "vertices", limits.vertices)?;
+        check_count(file.mesh.points().count(), "vertices", limits.vertices)?;
         check_count(file.mesh.triangles().len(), "triangles", limits.triangles)?;
         let unreadable = |part| move |error| ScanFault::Unreadable { part, error };
         let landmarks = self.landmarks.as_deref();
@@ -101,7 +101,7 @@ impl ScanFiles {
         Ok(&self.mesh)
     }
 
-    fn mesh_file(&self, limits: &ScanLimits, scratch: &Path) -> Result<MeshFile, ScanFault> {
+    fn mesh_file(&self, limits: &ScanLimits, scratch: &Path) -> Result<MeshFile<FilePoints>, ScanFault> {
         let unreadable = |error: FormatError| match error.fault() {
             Fault::Unreadable(_) => ScanFault::Scratch(io::Error::other(error)),
             _ => ScanFault::Unreadable { part: Part::Mesh, error },
@@ -112,7 +112,7 @@ impl ScanFiles {
                 let folder = tempfile::tempdir_in(scratch).map_err(ScanFault::Scratch)?;
                 let mesh = unpack(mesh, folder.path(), limits)?;
                 let name = mesh.file_name().unwrap_or_default().to_owned();
-                let mut file = MeshFile::read(&mesh).map_err(|error| unreadable(error.of_file(name)))?;
+                let mut file = MeshFile::look_at(&mesh).map_err(|error| unreadable(error.of_file(name)))?;
                 // The folder's path means nothing to whoever sent the zip.
                 let path = format!("{}/", folder.path().display());
                 file.warnings.iter_mut().for_each(|warning| *warning = warning.replace(&path, ""));
@@ -121,7 +121,7 @@ impl ScanFiles {
             kind => kind.extension(),
         };
         let length = mesh.metadata().map_err(ScanFault::Scratch)?.len();
-        MeshFile::read_from(mesh, length, Some(extension)).map_err(unreadable)
+        MeshFile::look_into(mesh, length, Some(extension)).map_err(unreadable)
     }
 }
 
@@ -134,7 +134,7 @@ impl ReadScan {
     /// The scan to be registered, by the name that it has in the collection; without landmarks it has none.
     pub fn into_subject(self, name: String) -> Subject {
         let Self { file, landmarks, mask } = self;
-        Subject { name, mesh: file.mesh, landmarks: landmarks.unwrap_or_default(), mask }
+        Subject { name, mesh: file.mesh.into(), landmarks: landmarks.unwrap_or_default(), mask }
     }
 }
 
