@@ -2,8 +2,9 @@ use wgpu::BufferUsages;
 use wgpu::util::DeviceExt;
 
 use super::chunk::Room;
-use super::kernels::{COLOURS, DEPTH};
+use super::draw_order::DrawOrder;
 use super::layout::{BatchUniform, Binding, EDGE_GRADIENT, ROW, Range, TRIANGLE_GRADIENT, ViewUniform};
+use super::raster::{COLOURS, DEPTH};
 use crate::mesh::Rows;
 use crate::render::Target;
 use crate::render::connectivity::Connectivity;
@@ -17,6 +18,7 @@ pub struct Buffers {
     normals: wgpu::Buffer,
     albedo: wgpu::Buffer,
     triangles: wgpu::Buffer,
+    draw_order: wgpu::Buffer,
     edges: wgpu::Buffer,
     corner_rows: wgpu::Buffer,
     end_rows: wgpu::Buffer,
@@ -33,6 +35,8 @@ pub struct Buffers {
     silhouettes: wgpu::Buffer,
     silhouette_count: wgpu::Buffer,
     result: wgpu::Buffer,
+    /// The triangles' corners among those of the draw order.
+    pub drawn_corners: wgpu::Buffer,
     /// What is read back.
     pub read: wgpu::Buffer,
     /// What is drawn: a layer for each view.
@@ -46,13 +50,12 @@ impl Buffers {
     pub fn new(device: &wgpu::Device, mesh: &Connectivity, room: Room) -> Self {
         let [vertices, triangles, edges] =
             [mesh.vertices, mesh.triangles.len(), mesh.edges.len()].map(|count| count as u64);
-        let filled = |numbers: &[u32]| {
-            device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-                label: None,
-                contents: bytemuck::cast_slice(numbers),
-                usage: BufferUsages::STORAGE,
-            })
+        let with = |numbers: &[u32], usage: BufferUsages| {
+            let contents = bytemuck::cast_slice(numbers);
+            device.create_buffer_init(&wgpu::util::BufferInitDescriptor { label: None, contents, usage })
         };
+        let filled = |numbers: &[u32]| with(numbers, BufferUsages::STORAGE);
+        let order = DrawOrder::new(mesh.vertices, &mesh.triangles);
         let empty = |usage: BufferUsages, numbers: u64| buffer(device, usage, numbers);
         let input = BufferUsages::STORAGE | BufferUsages::COPY_DST;
         // Copied from by tests alone.
@@ -70,6 +73,7 @@ impl Buffers {
             normals: empty(input, 4 * vertices),
             albedo: empty(input, 4 * vertices),
             triangles: filled(mesh.triangles.as_flattened()),
+            draw_order: filled(&order.vertices),
             edges: filled(mesh.edges.as_flattened()),
             corner_rows: filled(&flat(&mesh.corners)),
             end_rows: filled(&flat(&mesh.ends)),
@@ -86,6 +90,7 @@ impl Buffers {
             silhouettes: empty(inner, edges * room.views),
             silhouette_count: empty(output | BufferUsages::INDIRECT, 4),
             result: empty(output, results),
+            drawn_corners: with(order.corners.as_flattened(), BufferUsages::INDEX),
             read: empty(BufferUsages::MAP_READ | BufferUsages::COPY_DST, results),
             layers: (0..layers).map(|layer| single_layer(&drawn, layer)).collect(),
             depth: single_layer(&depth, 0),
@@ -102,6 +107,7 @@ impl Buffers {
             Binding::Normals => &self.normals,
             Binding::Albedo => &self.albedo,
             Binding::Triangles => &self.triangles,
+            Binding::DrawOrder => &self.draw_order,
             Binding::Edges => &self.edges,
             Binding::CornerRows => &self.corner_rows,
             Binding::EndRows => &self.end_rows,

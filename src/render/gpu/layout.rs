@@ -29,6 +29,7 @@ pub enum Binding {
     /// [`Self::Corners`], where vertices are drawn: to read alone.
     Drawn,
     Changed,
+    DrawOrder,
 }
 
 /// Threads in a row of pixels.

@@ -8,9 +8,11 @@
 mod buffers;
 mod chunk;
 mod device;
+mod draw_order;
 mod kernels;
 mod layout;
 mod passes;
+mod raster;
 #[cfg(test)]
 mod tests;
 

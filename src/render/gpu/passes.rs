@@ -126,7 +126,7 @@ impl Loaded {
         let room = if ranges.is_empty() { Room { views: 1, size: [1, 1], ..room } } else { room };
         let buffers = Buffers::new(&device.device, mesh, room);
         let chunks = (ranges.into_iter())
-            .map(|(range, _)| Chunk::new(&device.device, kernels, mesh, &buffers, range, targets))
+            .map(|(range, _)| Chunk::new(&device.device, kernels, &buffers, range, targets))
             .collect();
         let counts = BatchUniform {
             vertices: mesh.vertices as u32,
@@ -136,11 +136,8 @@ impl Loaded {
             strips: room.strips,
             ..Default::default()
         };
-        let views = kernels.raster[usize::from(mesh.closed)].bind_views(
-            &device.device,
-            buffers.get(Binding::Views, &buffers.read),
-            room.views,
-        );
+        let views =
+            kernels.raster.bind_views(&device.device, buffers.get(Binding::Views, &buffers.read), room.views);
         device.check()?;
         Ok(Self { buffers, room, chunks, views, counts })
     }
@@ -233,7 +230,7 @@ impl Loaded {
     }
 
     fn encode_raster(&self, kernels: &Kernels, batch: &Batch, encoder: &mut wgpu::CommandEncoder) {
-        let kernel = &kernels.raster[self.counts.closed as usize];
+        let pipeline = kernels.raster.pipeline(self.counts.closed != 0, batch.uniform.with_albedo != 0);
         let group = &self.chunks[batch.chunk].groups[Pass::Raster as usize];
         for (view, &Picture { size: [width, height], background, .. }) in (0..).zip(&batch.pictures) {
             let [r, g, b] = background.map(f64::from);
@@ -259,10 +256,11 @@ impl Loaded {
             });
             recorded.set_viewport(0.0, 0.0, width as f32, height as f32, 0.0, 1.0);
             recorded.set_scissor_rect(0, 0, width, height);
-            recorded.set_pipeline(&kernel.pipeline);
+            recorded.set_pipeline(pipeline);
             recorded.set_bind_group(0, group, &[]);
             recorded.set_bind_group(1, &self.views[view as usize], &[]);
-            recorded.draw(0..3 * self.counts.triangles, view..view + 1);
+            recorded.set_index_buffer(self.buffers.drawn_corners.slice(..), wgpu::IndexFormat::Uint32);
+            recorded.draw_indexed(0..3 * self.counts.triangles, 0, view..view + 1);
         }
         let (texture, buffer) = (&self.buffers.drawn, self.buffers.get(Binding::Colours, &self.buffers.read));
         for (layer, &Picture { size: [width, height], stride, pixels, .. }) in (0..).zip(&batch.pictures) {
@@ -283,7 +281,6 @@ impl Chunk {
     fn new(
         device: &wgpu::Device,
         kernels: &Kernels,
-        mesh: &Connectivity,
         buffers: &Buffers,
         range: std::ops::Range<usize>,
         targets: &[Target],
@@ -297,10 +294,10 @@ impl Chunk {
             })
             .collect();
         let buffer = |binding| buffers.get(binding, &colours);
-        let bound = |kernel: &Kernel<wgpu::ComputePipeline>| kernel.bind(device, buffer);
+        let bound = |kernel: &Kernel| kernel.bind(device, buffer);
         let groups = [
             bound(&kernels.project),
-            kernels.raster[usize::from(mesh.closed)].bind(device, buffer),
+            kernels.raster.bind(device, buffer),
             bound(&kernels.silhouette),
             bound(&kernels.loss),
             bound(&kernels.blend),

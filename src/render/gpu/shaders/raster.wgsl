@@ -9,11 +9,15 @@ struct Seen {
 }
 
 @group(0) @binding(22) var<storage, read> drawn: array<vec4<f32>>;
+// The vertex of each place of the draw order; the first ones are first corners of the triangles of their number.
+@group(0) @binding(24) var<storage, read> draw_order: array<u32>;
 @group(1) @binding(0) var<uniform> shown_view: View;
 
+override WITH_ALBEDO: bool;
+
 @vertex
-fn place(@builtin(vertex_index) index: u32, @builtin(instance_index) view: u32) -> Seen {
-    let vertex = triangles[index];
+fn place(@builtin(vertex_index) at: u32, @builtin(instance_index) view: u32) -> Seen {
+    let vertex = draw_order[at];
     let corner = drawn[view * batch.vertices + vertex];
     let size = vec2<f32>(shown_view.size);
     var seen: Seen;
@@ -24,17 +28,19 @@ fn place(@builtin(vertex_index) index: u32, @builtin(instance_index) view: u32) 
         NEAR,
         corner.z,
     );
-    seen.id = f32(index / 3u + 1u);
+    seen.id = f32(at + 1u);
     seen.normal = normals[vertex].xyz;
-    seen.albedo = vec3<f32>(1.0);
-    if batch.with_albedo != 0u {
-        seen.albedo = albedo[vertex].xyz;
-    }
+    seen.albedo = albedo[vertex].xyz;
     return seen;
 }
 
 @fragment
 fn shade(seen: Seen) -> @location(0) vec4<f32> {
     let normal = seen.normal / max(length(seen.normal), LEAST_NORMAL);
-    return vec4<f32>(light_colour(shown_view.light, normal) * seen.albedo, seen.id);
+    var colour = light_colour(shown_view.light, normal);
+    // What no pixel asks for is not placed either.
+    if WITH_ALBEDO {
+        colour *= seen.albedo;
+    }
+    return vec4<f32>(colour, seen.id);
 }
