@@ -156,6 +156,7 @@ impl<'a> Scene<'a> {
                 let painted = settings.albedo == Albedo::Vertex && shaded;
                 state.albedo = painted.then(|| vec![[1.0; 3]; state.positions.len()]);
             } else if level.level != sphere.level {
+                smooth(&sphere, settings.level_diffusion, &mut state.positions);
                 sphere = Sphere::of_level(level.level);
                 state = subdivided(&sphere, state);
             }
@@ -186,8 +187,7 @@ impl<'a> Scene<'a> {
         let (fitted, _) = fit_scan("hull", &surface, &fit, observer)?;
         let mut positions: Vec<Vec3A> = fitted.into_iter().map(|p| self.space.to_unit(p)).collect();
         // The hull's cells leave steps that only many iterations would wear off.
-        let smoothing = sphere.reparameterization(settings.hull_diffusion);
-        smoothing.to_positions(&mut positions, &mut SolveBuffer::default());
+        smooth(sphere, settings.hull_diffusion, &mut positions);
         Ok(positions)
     }
 
@@ -233,6 +233,13 @@ impl<'a> Scene<'a> {
 
 fn given_light(settings: &InvertSettings) -> Option<Light> {
     (settings.light.len() == 9).then(|| Light(std::array::from_fn(|j| settings.light[j])))
+}
+
+/// p = (I + lambda L)^-1 p.
+fn smooth(sphere: &Sphere, lambda: f64, positions: &mut [Vec3A]) {
+    if lambda > 0.0 {
+        sphere.reparameterization(lambda).to_positions(positions, &mut SolveBuffer::default());
+    }
 }
 
 fn subdivided(sphere: &Sphere, state: State) -> State {

@@ -62,6 +62,7 @@ impl InvertSettings {
             hull_cells: 80,
             hull_fit: preset == InvertPreset::Default,
             hull_diffusion: 1.0,
+            level_diffusion: 2.0,
             start_radius: 1.0,
             levels,
         })
@@ -117,14 +118,14 @@ fn paper(level: u32, scene: &Scene) -> InvertLevel {
     }
 }
 
-/// The hull gives the outlines, so that no level has far to go; small pictures and a few views at a time suffice while the
-/// mesh is coarse. What is left then is small, and a small lambda lets it in.
+/// The hull gives the outlines, so that no level has far to go; small pictures suffice while the mesh is coarse, and a few of
+/// the large ones at a time. What is left then is small, and a small lambda lets it in.
 fn coarse_to_fine(finest: u32) -> Vec<InvertLevel> {
     let coarsest = finest.min(4);
-    let level = |level: u32, size, iterations, lambda, [rate, rate_end]: [f32; 2]| InvertLevel {
+    let level = |level: u32, size, batch, iterations, lambda, [rate, rate_end]: [f32; 2]| InvertLevel {
         level,
         size,
-        batch: 8,
+        batch,
         iterations,
         lambda,
         rate,
@@ -133,6 +134,6 @@ fn coarse_to_fine(finest: u32) -> Vec<InvertLevel> {
         smooth: Smooth::Off,
     };
     let finer = (coarsest + 1).min(finest)..=finest;
-    let first = level(coarsest, 256, 300, 5.0, [3e-2, 0.3]);
-    std::iter::once(first).chain(finer.map(|k| level(k, 512, 200, 2.0, [1e-2, 0.05]))).collect()
+    let first = level(coarsest, 256, 0, 300, 5.0, [3e-2, 0.3]);
+    std::iter::once(first).chain(finer.map(|k| level(k, 512, 8, 400, 3.0, [1e-2, 0.05]))).collect()
 }

@@ -95,6 +95,10 @@ pub struct InvertSettings {
     pub hull_fit: bool,
     /// lambda of the diffusion (I + lambda L)^-1 that smooths what was fitted to the hull.
     pub hull_diffusion: f64,
+    /// lambda of the diffusion that smooths the shape before a finer level: what no view sees crumples, and no picture takes
+    /// that back.
+    #[serde(default)]
+    pub level_diffusion: f64,
     /// Radius of the sphere otherwise, in those of the ball with the hull's volume.
     pub start_radius: f32,
     /// The levels in order, each on the same sphere as the one before or on its subdivision.
