@@ -62,7 +62,7 @@ impl InvertSettings {
             hull_cells: 80,
             hull_fit: preset == InvertPreset::Default,
             hull_diffusion: 1.0,
-            level_diffusion: 2.0,
+            level_diffusion: 0.4,
             start_radius: 1.0,
             levels,
         })
@@ -135,5 +135,5 @@ fn coarse_to_fine(finest: u32) -> Vec<InvertLevel> {
     };
     let finer = (coarsest + 1).min(finest)..=finest;
     let first = level(coarsest, 256, 0, 300, 5.0, [3e-2, 0.3]);
-    std::iter::once(first).chain(finer.map(|k| level(k, 512, 8, 400, 3.0, [1e-2, 0.05]))).collect()
+    std::iter::once(first).chain(finer.map(|k| level(k, 512, 8, 250, 2.0, [1e-2, 0.05]))).collect()
 }
