@@ -21,19 +21,14 @@ pub(super) fn weld(geometry: Geometry) -> Geometry {
         a != b && b != c && c != a
     };
     let kept: Vec<bool> = triangles.iter().map(stays).collect();
-    let left: Vec<[u32; 3]> = kept_of(&triangles, &kept).map(welded).collect();
+    let left: Vec<[u32; 3]> = kept_of(triangles.iter(), &kept).map(welded).collect();
     let renamed = renamed(&left, geometry.positions.count());
     let named: Vec<bool> = renamed.iter().map(|&index| index != GONE).collect();
     let mut polygons = Polygons::with_capacity(left.len());
     left.iter().for_each(|corners| polygons.push_triangle(corners.map(|index| renamed[index as usize])));
     Geometry {
-        positions: geometry
-            .positions
-            .each()
-            .zip(&named)
-            .filter_map(|(p, &named)| named.then_some(p))
-            .collect(),
-        colours: geometry.colours.map(|colours| kept_of(&colours, &named).copied().collect()),
+        positions: kept_of(geometry.positions.each(), &named).collect(),
+        colours: geometry.colours.map(|colours| kept_of(colours.into_iter(), &named).collect()),
         texture: geometry.texture.map(|texture| without(texture, &kept)),
         polygons,
         order: FileOrder {
@@ -45,15 +40,15 @@ pub(super) fn weld(geometry: Geometry) -> Geometry {
 }
 
 /// The entries that are to be kept.
-fn kept_of<'a, T>(values: &'a [T], kept: &'a [bool]) -> impl Iterator<Item = &'a T> {
-    values.iter().zip(kept).filter(|(_, kept)| **kept).map(|(value, _)| value)
+fn kept_of<T>(values: impl Iterator<Item = T>, kept: &[bool]) -> impl Iterator<Item = T> {
+    values.zip(kept).filter(|(_, kept)| **kept).map(|(value, _)| value)
 }
 
 /// The texture without the triangles that go.
 fn without(texture: Texture, kept: &[bool]) -> Texture {
     let (corners, _) = texture.corners.as_chunks::<3>();
-    let corners = kept_of(corners, kept).copied().collect::<Vec<_>>().into_flattened();
-    let polygon_images = kept_of(&texture.polygon_images, kept).copied().collect();
+    let corners = kept_of(corners.iter().copied(), kept).collect::<Vec<_>>().into_flattened();
+    let polygon_images = kept_of(texture.polygon_images.into_iter(), kept).collect();
     Texture { corners, polygon_images, ..texture }
 }
 

@@ -20,7 +20,11 @@ impl DrawOrder {
         let mut drawn: Vec<u32> = turned.iter().map(|corners| corners[0]).collect();
         let mut alone = vec![None; vertices];
         let mut place = |vertex: u32, triangle: u32| {
-            let nearest = places.row(vertex as usize).iter().min_by_key(|place| place.abs_diff(triangle));
+            let row = places.row(vertex as usize);
+            // It ascends: one that many triangles begin with is not looked through for each of them.
+            let after = row.partition_point(|&place| place < triangle);
+            let beside = &row[after.saturating_sub(1)..row.len().min(after + 1)];
+            let nearest = beside.iter().min_by_key(|place| place.abs_diff(triangle));
             nearest.copied().unwrap_or_else(|| {
                 *alone[vertex as usize].get_or_insert_with(|| {
                     drawn.push(vertex);
