@@ -156,6 +156,6 @@ fn groupwise() -> GroupwiseSettings {
         film_stretch: 6.0,
         film_share: 0.3,
         plane: 0.9,
-        settle: SettleSettings { iterations: 6, normals: 0.12, stiffness: 0.003 },
+        settle: SettleSettings { iterations: 12, normals: 0.2, stiffness: 0.003 },
     }
 }

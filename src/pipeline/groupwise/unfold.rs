@@ -21,8 +21,10 @@ const SAMPLES: usize = 20_000;
 const GROWTH: f32 = 1.2;
 const SLACK: f32 = 2e-7;
 
-/// How far landmarks may drift from their places on the scan: about a millimetre on a head.
+/// How far landmarks may drift from their places on the scan, about a millimetre on a head, and the share of it to which
+/// smoothing takes them back.
 const DRIFT: f32 = 5e-3;
+const HELD: f32 = 0.8;
 
 /// Rounds of averaging the normals that tell one sheet of the scan from the one behind it.
 const NORMAL_ROUNDS: usize = 2;
@@ -30,7 +32,7 @@ const NORMAL_ROUNDS: usize = 2;
 /// Unfolds triangles of a registered shape `[N, 3]` that lie on the scan and face away from it.
 ///
 /// The vertices around each fold slide over the scan to the mean of their neighbours: a flat patch whose vertices all
-/// lie there has no folds (Tutte 1963). A fold keeps its new positions if fewer of its triangles are folded in them,
+/// lie there has no folds (Tutte 1963). Landmarks that drift take the corners between them back. A fold keeps its new positions if fewer of its triangles are folded in them,
 /// the scan's samples there are no farther from it than they were, and no landmark drifts; otherwise its old ones.
 /// `index` is of its triangles, wherever they were last.
 pub fn unfold(
@@ -174,8 +176,25 @@ impl Folds<'_> {
             });
             let moved: Vec<Vec3A> = moved.collect();
             patches.vertices.iter().zip(moved).for_each(|(&i, at)| p[i as usize] = at);
+            self.hold_landmarks(&mut p, patches);
         }
         p
+    }
+
+    /// Takes landmarks that have drifted back, by the least step of those corners around them that move.
+    fn hold_landmarks(&self, p: &mut [Vec3A], patches: &Patches) {
+        for landmark in self.landmarks {
+            let corners = self.corners(landmark.triangle);
+            let off = landmark.target - interpolate(p, corners, landmark.weights);
+            let beyond = off - off.clamp_length_max(HELD * DRIFT);
+            let moving = || {
+                let corners = corners.into_iter().zip(landmark.weights);
+                corners.filter(|(i, _)| patches.of_vertex[*i as usize] != NONE)
+            };
+            // One that hangs on a corner it hardly touches does not throw that about.
+            let share = moving().map(|(_, w)| w * w).sum::<f32>().max(1.0 / 3.0);
+            moving().for_each(|(i, w)| p[i as usize] += beyond * (w / share));
+        }
     }
 
     /// A vertex's normal averaged over its rings.
@@ -250,7 +269,7 @@ impl Folds<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::{Icosphere, TriangleMesh};
+    use crate::mesh::{Icosphere, Topology, TriangleMesh};
     use crate::pipeline::Sphere;
 
     fn bumpy(p: Vec3A) -> Vec3A {
@@ -292,20 +311,49 @@ mod tests {
         assert!(off < 0.01, "{off}");
     }
 
-    #[test]
-    fn a_landmark_holds_the_fold_it_lies_in() {
+    /// Swaps neighbours, so that the triangles around them fold, and unfolds them with a landmark in `triangle_of`'s choice of
+    /// them; returns the folded triangles before and after, and how far the landmark drifts, unfolded and where all is flat.
+    fn unfolded_around(
+        triangle_of: impl Fn(&Topology, [u32; 2]) -> (u32, [f32; 3]),
+    ) -> ([usize; 2], [f32; 2]) {
         let (scan, sphere) = (scan(), Sphere::of_level(4));
         let topology = &sphere.connectivity.topology;
-        let mut p = on_scan(&scan, &sphere);
+        let flat = on_scan(&scan, &sphere);
+        let mut p = flat.clone();
         let [a, b] = topology.edges[700];
         p.swap(a as usize, b as usize);
-        let before = p.clone();
-        // Where vertex a is now, away from where smoothing takes it.
-        let triangle = topology.fans.row(a as usize)[0][0];
-        let weights = topology.triangles[triangle as usize].map(|i| if i == a { 1.0 } else { 0.0 });
-        let landmark = LandmarkPull { triangle, weights, target: p[a as usize], weight: 1.0 };
-        unfold_all(&sphere, &scan, &[landmark], &mut p);
-        assert_eq!(p, before);
+        let (triangle, weights) = triangle_of(topology, [a, b]);
+        let place = |p: &[Vec3A]| interpolate(p, topology.triangles[triangle as usize], weights);
+        let target = place(&p);
+        let folds = Folds { connectivity: &sphere.connectivity, scan: &scan, landmarks: &[] };
+        let folded = |p: &[Vec3A]| folds.among(p, 0..topology.triangles.len() as u32).len();
+        let before = folded(&p);
+        unfold_all(&sphere, &scan, &[LandmarkPull { triangle, weights, target, weight: 1.0 }], &mut p);
+        ([before, folded(&p)], [&p, &flat].map(|p| target.distance(place(p))))
+    }
+
+    #[test]
+    fn a_landmark_on_what_is_folded_stays_in_its_place() {
+        // On a vertex, as far from where it would be unfolded as an edge is long.
+        let on_vertex = |topology: &Topology, [a, _]: [u32; 2]| {
+            let triangle = topology.fans.row(a as usize)[0][0];
+            (triangle, topology.triangles[triangle as usize].map(|i| if i == a { 1.0 } else { 0.0 }))
+        };
+        let ([before, after], [drift, flat]) = unfolded_around(on_vertex);
+        assert!(flat > 10.0 * DRIFT, "{flat}");
+        assert!(drift <= DRIFT && after < before, "{drift}, {after} of {before}");
+    }
+
+    #[test]
+    fn what_is_folded_beside_a_landmark_is_unfolded_and_the_landmark_stays_in_its_place() {
+        let beside = |topology: &Topology, [a, b]: [u32; 2]| {
+            let without = |t: &&[u32; 3]| !topology.triangles[t[0] as usize].contains(&b);
+            let triangle = topology.fans.row(a as usize).iter().find(without).unwrap()[0];
+            (triangle, topology.triangles[triangle as usize].map(|i| if i == a { 0.2 } else { 0.4 }))
+        };
+        let ([before, after], [drift, flat]) = unfolded_around(beside);
+        assert!(flat > 2.0 * DRIFT && before >= 2, "{flat} {before}");
+        assert!(drift <= DRIFT && after == 0, "{drift} {after}");
     }
 
     #[test]
