@@ -10,7 +10,8 @@ use crate::spatial::SurfaceIndex;
 /// little as unfolds it, so that what corresponds stays where it is.
 const ATTEMPTS: [(usize, usize); 6] = [(0, 4), (0, 8), (1, 4), (1, 8), (2, 9), (3, 12)];
 
-/// Triangles farther than this from the scan, in unit space, lie on nothing that they could be folded on.
+/// Triangles farther than this from the scan, in unit space, lie on nothing that they could be folded on, and samples
+/// farther than this from the shape are of what it has not entered: they would hide what is lost beside them.
 const NEAR: f32 = 0.02;
 
 /// Scan samples that watch over what the smoothing takes away.
@@ -32,9 +33,9 @@ const NORMAL_ROUNDS: usize = 2;
 /// Unfolds triangles of a registered shape `[N, 3]` that lie on the scan and face away from it.
 ///
 /// The vertices around each fold slide over the scan to the mean of their neighbours: a flat patch whose vertices all
-/// lie there has no folds (Tutte 1963). Landmarks that drift take the corners between them back. A fold keeps its new positions if fewer of its triangles are folded in them,
-/// the scan's samples there are no farther from it than they were, and no landmark drifts; otherwise its old ones.
-/// `index` is of its triangles, wherever they were last.
+/// lie there has no folds (Tutte 1963). Landmarks that drift take the corners between them back. A fold keeps its new
+/// positions if fewer of its triangles are folded in them, the scan's samples there are no farther from it than they were,
+/// and no landmark drifts; otherwise its old ones. `index` is of its triangles, wherever they were last.
 pub fn unfold(
     connectivity: &Connectivity,
     scan: &ScanSurface,
@@ -124,11 +125,12 @@ impl Folds<'_> {
             && self.scan.weight_at(&hit) > 0.0
     }
 
-    /// The triangle that lies nearest each of the scan's samples.
+    /// The scan's samples near the shape, each with the triangle that it lies nearest to.
     fn samples(&self, index: &SurfaceIndex) -> Vec<(Vec3A, u32)> {
         let nearest = |k: usize| {
             let sample = self.scan.sample(k);
-            (sample.weight > 0.0).then(|| (sample.point, index.closest(sample.point).triangle))
+            let hit = (sample.weight > 0.0).then(|| index.closest(sample.point))?;
+            (hit.distance_squared < NEAR * NEAR).then_some((sample.point, hit.triangle))
         };
         (0..SAMPLES).into_par_iter().with_min_len(256).filter_map(nearest).collect()
     }
