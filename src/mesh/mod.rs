@@ -1,5 +1,6 @@
 //! Triangle meshes, the landmarks on them, and the template spheres. Layer 0: imports nothing of this crate.
 
+mod cap;
 mod component;
 mod edge_length;
 mod icosphere;
@@ -11,6 +12,7 @@ mod sphere_layout;
 mod topology;
 mod triangle_mesh;
 
+pub use cap::capped;
 pub use component::components;
 pub use edge_length::{mean_edge_lengths, pull_back_mean_edge_lengths};
 pub use icosphere::{Icosphere, Midpoints};

@@ -6,7 +6,7 @@ use super::invert::{InvertError, Shown};
 use super::observer::{Observer, Stage, Watch};
 use crate::camera::{Intrinsics, Pose};
 use crate::formats::{Photograph, Pixels};
-use crate::mesh::{Normals, Topology, TriangleMesh};
+use crate::mesh::{Normals, Topology, TriangleMesh, capped};
 use crate::render::{Light, MeshLayout, Renderer, Rendering, Surface, Target, View};
 
 /// How a mesh is taken pictures of.
@@ -44,10 +44,11 @@ pub fn studio_light() -> Light {
     STUDIO
 }
 
-/// Takes pictures of a mesh, in light intensities.
+/// Takes pictures of a mesh, in light intensities. Its openings are shown with a flat cap: what no surface bounds has an
+/// inside that would be seen, and no solid looks like that.
 ///
 /// # Errors
-/// [`InvertError::Render`], [`InvertError::Canceled`].
+/// [`InvertError::Render`], [`InvertError::Mesh`], [`InvertError::Canceled`].
 pub fn capture(
     mesh: &TriangleMesh,
     settings: &CaptureSettings,
@@ -55,7 +56,8 @@ pub fn capture(
     observer: &dyn Observer,
 ) -> Result<Vec<Photograph>, InvertError> {
     let watch = Watch { observer, stage: Stage::Capture, scan: "pictures", iterations: settings.views };
-    let topology = Topology::of(mesh);
+    let solid = &capped(mesh, &Topology::of(mesh))?;
+    let topology = Topology::of(solid);
     // Meshes far from the origin would lose their shape in single precision.
     let (low, high) = mesh
         .positions()
@@ -64,9 +66,11 @@ pub fn capture(
     let centre = 0.5 * (low + high);
     let radius = mesh.radius_about(centre);
     let positions: Vec<Vec3A> =
-        mesh.positions().iter().map(|p| ((*p - centre) / radius).as_vec3a()).collect();
+        solid.positions().iter().map(|p| ((*p - centre) / radius).as_vec3a()).collect();
     let normals = Normals::new(&topology, &positions).vertices;
     let surface = Surface { positions: &positions, normals: &normals, albedo: None };
+    // Caps have vertices of their own: nothing is open though it looks so to the topology.
+    let layout = MeshLayout { closed: true, ..MeshLayout::of(&topology) };
     let mut photographs = Vec::with_capacity(settings.views);
     for (at, direction) in fibonacci(settings.views).enumerate() {
         let intrinsics = Intrinsics::with_angle([settings.size; 2], ANGLE);
@@ -81,7 +85,7 @@ pub fn capture(
             unseen: None,
         };
         let target = target(&photograph, settings);
-        renderer.prepare(MeshLayout::of(&topology), std::slice::from_ref(&target))?;
+        renderer.prepare(layout, std::slice::from_ref(&target))?;
         photograph.pixels = averaged(&renderer.picture(&surface, 0)?, settings.samples);
         photograph.pose.translation = pose.translation * radius - pose.rotation * centre;
         photographs.push(photograph);
