@@ -17,4 +17,4 @@ pub use foldover::Foldover;
 pub use landmark::{LandmarkPull, Landmarks};
 pub use normal::{SampleNormals, VertexNormals};
 pub use shape::{Gradient, Shape};
-pub use smoothness::Smoothness;
+pub use smoothness::{Smoothness, laplacian};

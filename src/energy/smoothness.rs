@@ -29,7 +29,8 @@ impl Smoothness {
     }
 }
 
-fn laplacian(topology: &Topology, values: &[Vec3A]) -> Vec<Vec3A> {
+/// L v of values `[N, 3]`, with the combinatorial Laplacian.
+pub fn laplacian(topology: &Topology, values: &[Vec3A]) -> Vec<Vec3A> {
     let at = |i: usize| {
         let ring = topology.neighbours.row(i);
         values[i] * ring.len() as f32 - ring.iter().map(|&j| values[j as usize]).sum::<Vec3A>()

@@ -7,8 +7,8 @@ use glam::Vec3A;
 use super::error::InvertError;
 use super::light;
 use super::settings::{InvertLevel, InvertSettings, Smooth};
-use crate::energy::{Gradient, Shape, Smoothness};
-use crate::mesh::Normals;
+use crate::energy::{Gradient, Shape, Smoothness, laplacian};
+use crate::mesh::{Normals, Topology};
 use crate::numeric::{AdamUniform, SolveBuffer};
 use crate::pipeline::density_term::DensityTerm;
 use crate::pipeline::sphere::Sphere;
@@ -106,7 +106,9 @@ impl<'a> Descent<'a> {
         let shape = Shape { topology, positions: &self.state.positions, normals: &self.normals };
         let gradient = self.gradient.total(shape);
         self.reparameterization.pull_back(gradient, &mut self.buffer);
-        self.adam.step(&mut self.u, gradient, self.level.rate * self.level.rate_end.powf(x));
+        let rate = self.level.rate * self.level.rate_end.powf(x);
+        self.adam.step(&mut self.u, gradient, rate);
+        fair(topology, rate * self.level.fairing, &mut self.u);
         if let (Some(paint), Some(albedo)) = (&mut self.paint, &mut self.state.albedo) {
             paint.step(albedo, &self.rendered.albedo, &mut self.buffer);
         }
@@ -170,6 +172,14 @@ impl<'a> Descent<'a> {
     }
 }
 
+/// u - share L^2 u: bends that no picture asks for wear off, apart from the energies as weights decay in AdamW.
+fn fair(topology: &Topology, share: f32, u: &mut [Vec3A]) {
+    if share > 0.0 {
+        let bends = laplacian(topology, &laplacian(topology, u));
+        u.iter_mut().zip(bends).for_each(|(u, bend)| *u -= bend * share);
+    }
+}
+
 /// Views in an order in which those that follow one another stand apart, where neighbours in the file stand together.
 fn spread(views: usize) -> Vec<usize> {
     let gcd = |mut a: usize, mut b: usize| {
@@ -227,7 +237,34 @@ impl Paint {
 
 #[cfg(test)]
 mod tests {
+    use super::super::setting_check::MOST_FAIRING;
     use super::*;
+    use crate::mesh::Icosphere;
+
+    #[test]
+    fn bends_wear_off_and_what_is_smooth_stays() {
+        let sphere = Icosphere::new(3);
+        let topology = Topology::new(sphere.positions.len(), &sphere.triangles);
+        let smooth: Vec<Vec3A> = sphere.positions.iter().map(|p| p.as_vec3a()).collect();
+        let faired = |mut u: Vec<Vec3A>| {
+            (0..50).for_each(|_| fair(&topology, MOST_FAIRING, &mut u));
+            u
+        };
+        let mut spiked = smooth.clone();
+        spiked[300] *= 1.5;
+        let (spiked, round) = (faired(spiked), faired(smooth.clone()));
+        let most = |a: &[Vec3A], b: &[Vec3A], counts: &dyn Fn(usize) -> bool| {
+            let counted = (0..a.len()).filter(|&i| counts(i));
+            counted.map(|i| a[i].distance(b[i])).fold(0.0, f32::max)
+        };
+        let spike = most(&spiked, &round, &|i| i == 300);
+        assert!(spike < 0.1, "{spike} of 0.5");
+        let far = most(&spiked, &round, &|i| smooth[i].dot(smooth[300]) < 0.0);
+        assert!(far < 1e-3, "{far}");
+        // Its triangles are not all alike, so that L bends a sphere a little.
+        let round = most(&round, &smooth, &|_| true);
+        assert!(round < 0.04, "{round}");
+    }
 
     #[test]
     fn every_view_has_its_turn() {

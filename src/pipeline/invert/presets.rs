@@ -80,6 +80,7 @@ impl InvertSettings {
         for level in &mut self.levels {
             level.density = Density::Off;
             level.lambda = 0.0;
+            level.fairing = 0.0;
             level.smooth = if squared {
                 Smooth::BiLaplacian { weight: bi_laplacian }
             } else {
@@ -113,6 +114,7 @@ fn paper(level: u32, scene: &Scene) -> InvertLevel {
         lambda: 19.0,
         rate: scene.rate,
         rate_end: 1.0,
+        fairing: 0.0,
         density: Density::Scheduled { strength: STRENGTH_IN_UNIT_SPACE * scene.strength },
         smooth: Smooth::Off,
     }
@@ -130,10 +132,16 @@ fn coarse_to_fine(finest: u32) -> Vec<InvertLevel> {
         lambda,
         rate,
         rate_end,
+        fairing: 0.0,
         density: Density::Off,
         smooth: Smooth::Off,
     };
     let finer = (coarsest + 1).min(finest)..=finest;
     let first = level(coarsest, 256, 0, 300, 5.0, [3e-2, 0.3]);
-    std::iter::once(first).chain(finer.map(|k| level(k, 512, 8, 250, 2.0, [1e-2, 0.05]))).collect()
+    let finer = finer.map(|k| InvertLevel {
+        // What is a bend of the shape on a coarse mesh is a crumple on a fine one.
+        fairing: 0.01 * 5f32.powi(k as i32 - 4),
+        ..level(k, 512, 8, 350, 2.0, [1e-2, 0.05])
+    });
+    std::iter::once(first).chain(finer).collect()
 }

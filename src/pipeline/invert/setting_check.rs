@@ -1,10 +1,14 @@
-use super::settings::InvertSettings;
+use super::settings::{InvertLevel, InvertSettings};
 use crate::mesh::Icosphere;
 use crate::pipeline::setting_name::{FINEST, check_numbers, document, with_parameter};
 use crate::pipeline::settings::SettingError;
 
 /// Most pixels along a picture's side, and iterations of a level.
 const LIMITS: [(&str, u64); 2] = [("size", 8192), ("iterations", 100_000)];
+
+/// The largest product of fairing and rate: eigenvalues of L^2 are 144 at most where no vertex has more than six neighbours,
+/// and beyond 2 / 144 a step makes the steepest bends larger.
+pub(super) const MOST_FAIRING: f32 = 2.0 / 144.0;
 
 impl InvertSettings {
     /// Sets the parameter of a dotted name, as [`crate::pipeline::Settings::set`] does.
@@ -71,17 +75,24 @@ impl InvertSettings {
             let problem = format!("must end at the level of {} vertices", self.vertices);
             return Err(SettingError::Levels { stage: "invert", problem });
         }
-        for (at, level) in self.levels.iter().enumerate() {
-            let found = [u64::from(level.size), level.iterations as u64];
-            for ((field, most), found) in LIMITS.iter().zip(found) {
-                if found == 0 || found > *most {
-                    return Err(SettingError::Value {
-                        name: format!("levels.{at}.{field}"),
-                        value: found.to_string(),
-                        reason: format!("it must be between 1 and {most}"),
-                    });
-                }
+        self.levels.iter().enumerate().try_for_each(|(at, level)| level.check(at))
+    }
+}
+
+impl InvertLevel {
+    fn check(&self, at: usize) -> Result<(), SettingError> {
+        let wrong = |field: &str, value: String, reason: String| {
+            Err(SettingError::Value { name: format!("levels.{at}.{field}"), value, reason })
+        };
+        let found = [u64::from(self.size), self.iterations as u64];
+        for ((field, most), found) in LIMITS.iter().zip(found) {
+            if found == 0 || found > *most {
+                return wrong(field, found.to_string(), format!("it must be between 1 and {most}"));
             }
+        }
+        if self.fairing * self.rate * self.rate_end.max(1.0) > MOST_FAIRING {
+            let reason = format!("times the level's rate it must be {MOST_FAIRING} at most");
+            return wrong("fairing", self.fairing.to_string(), reason);
         }
         Ok(())
     }
@@ -117,6 +128,7 @@ mod tests {
         assert!(complaint("levels.0.siz", "3").contains("iterations"));
         assert!(complaint("levels.0.size", "0").contains("between 1 and 8192"));
         assert!(complaint("levels.0.iterations", "9999999").contains("100000"));
+        assert!(complaint("levels.1.fairing", "2").contains("times the level's rate"));
         assert!(complaint("light", "[[1,2,3]]").contains("nine rows"));
         assert!(complaint("most_views", "1").contains("two views"));
         assert!(complaint("levels.1.level", "6").contains("one finer"));

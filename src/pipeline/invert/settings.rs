@@ -123,6 +123,9 @@ pub struct InvertLevel {
     pub rate: f32,
     /// Step at the last iteration, as a share of the first; in between it decays geometrically.
     pub rate_end: f32,
+    /// Share of the step by which L^2 u is taken off u after each: bends that no picture asks for wear off.
+    #[serde(default)]
+    pub fairing: f32,
     /// Density adaptation.
     pub density: Density,
     /// Regularisation of plain positions.
