@@ -39,8 +39,14 @@ impl Settings {
                 register: coarse_to_fine(level.min(4), 150),
                 from_head: true,
                 audit_weights: false,
-                // With few vertices lips that were drawn flat do not grow anew.
-                groupwise: GroupwiseSettings { film_share: if level > 4 { 0.3 } else { 0.4 }, ..groupwise() },
+                groupwise: GroupwiseSettings {
+                    // With few vertices lips that were drawn flat do not grow anew.
+                    film_share: if level > 4 { 0.3 } else { 0.4 },
+                    // A few long triangles line open mouths unless much is asked for them; more vertices than these have
+                    // enough there, fewer have none to spare.
+                    most_need: if level == 4 { 4.0 } else { 2.0 },
+                    ..groupwise()
+                },
                 transfer: transfer(),
             },
         })
