@@ -42,7 +42,7 @@ impl ScanQuality {
         let noise = median(&offsets) / NOISE_TO_OFFSET;
         let far = (SPIKE[0] * radius).max(SPIKE[1] * noise);
         let spikes = offsets.iter().filter(|&&offset| offset > far).count();
-        let single = topology.edge_triangles.iter().filter(|[one, other]| one == other).count();
+        let single = topology.rim_edges().count();
         Self {
             radius,
             edge: median(&lengths),

@@ -10,7 +10,7 @@ use super::{MeshError, Topology, TriangleMesh, components};
 /// # Errors
 /// As [`TriangleMesh::new`]: more vertices than can be numbered.
 pub fn capped(mesh: &TriangleMesh, topology: &Topology) -> Result<TriangleMesh, MeshError> {
-    let rim = rim_edges(topology);
+    let rim = directed_rim(topology);
     let mut positions = mesh.positions().to_vec();
     let mut triangles = mesh.triangles().to_vec();
     let joined: Vec<[u32; 3]> = rim.iter().map(|&[a, b]| [a, b, b]).collect();
@@ -37,10 +37,8 @@ pub fn capped(mesh: &TriangleMesh, topology: &Topology) -> Result<TriangleMesh, 
 }
 
 /// The edges with one triangle, in its order of corners `[R, 2]`.
-fn rim_edges(topology: &Topology) -> Vec<[u32; 2]> {
-    let on_rim =
-        topology.edges.iter().zip(&topology.edge_triangles).filter(|(_, [left, right])| left == right);
-    let directed = on_rim.map(|(&[a, b], &[triangle, _])| {
+fn directed_rim(topology: &Topology) -> Vec<[u32; 2]> {
+    let directed = topology.rim_edges().map(|([a, b], triangle)| {
         let [i, j, k] = topology.triangles[triangle as usize];
         if [[i, j], [j, k], [k, i]].contains(&[a, b]) { [a, b] } else { [b, a] }
     });

@@ -16,12 +16,10 @@ impl Rim {
     /// The rim of a surface; a closed one has none.
     pub fn of(topology: &Topology) -> Self {
         let mut sides = vec![[false; 3]; topology.triangles.len()];
-        for (&[a, b], &[left, right]) in topology.edges.iter().zip(&topology.edge_triangles) {
-            if left == right {
-                let t = left as usize;
-                for (side, corner) in sides[t].iter_mut().zip(topology.triangles[t]) {
-                    *side |= corner != a && corner != b;
-                }
+        for ([a, b], triangle) in topology.rim_edges() {
+            let t = triangle as usize;
+            for (side, corner) in sides[t].iter_mut().zip(topology.triangles[t]) {
+                *side |= corner != a && corner != b;
             }
         }
         let corners = topology.triangles.iter().map(|t| t.map(|i| topology.on_rim[i as usize])).collect();

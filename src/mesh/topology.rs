@@ -72,11 +72,8 @@ impl Topology {
     pub fn new(vertices: usize, triangles: &[[u32; 3]]) -> Self {
         let (edges, edge_triangles) = edges_of(vertices, triangles);
         let mut on_rim = vec![false; vertices];
-        for (&[a, b], [left, right]) in edges.iter().zip(&edge_triangles) {
-            if left == right {
-                on_rim[a as usize] = true;
-                on_rim[b as usize] = true;
-            }
+        for (edge, _) in rim_edges(&edges, &edge_triangles) {
+            edge.iter().for_each(|&i| on_rim[i as usize] = true);
         }
         // Edges are sorted: with smaller neighbours before larger ones, rows come out ascending.
         let smaller = edges.iter().map(|&[a, b]| (b, a));
@@ -98,6 +95,11 @@ impl Topology {
         self.neighbours.len()
     }
 
+    /// The edges with one triangle, each with that triangle.
+    pub fn rim_edges(&self) -> impl Iterator<Item = ([u32; 2], u32)> {
+        rim_edges(&self.edges, &self.edge_triangles)
+    }
+
     /// The mesh of these triangles on positions `[N, 3]`.
     ///
     /// # Errors
@@ -105,6 +107,11 @@ impl Topology {
     pub fn mesh(&self, positions: Vec<glam::DVec3>) -> Result<TriangleMesh, MeshError> {
         TriangleMesh::new(positions, self.triangles.clone())
     }
+}
+
+fn rim_edges(edges: &[[u32; 2]], edge_triangles: &[[u32; 2]]) -> impl Iterator<Item = ([u32; 2], u32)> {
+    let on_rim = edges.iter().zip(edge_triangles).filter(|(_, [left, right])| left == right);
+    on_rim.map(|(&edge, &[triangle, _])| (edge, triangle))
 }
 
 /// Undirected edges, sorted, with the first and last triangle at each.
